@@ -1,0 +1,25 @@
+//! Object-centric photometric bundle adjustment with a deep shape prior, in Burn.
+//!
+//! A few pictures of an object and a known camera go in; the camera pose of every frame and a full
+//! point cloud, hidden side included, come out. The method is Zhu, Wang, Lin, Wang and Lucey's
+//! "Object-Centric Photometric Bundle Adjustment with Deep Shape Prior"; modules stand in the order
+//! in which its text meets them, and name the equation that they are.
+
+pub mod camera;
+pub mod shape_prior;
+pub mod regressor;
+pub mod pseudo_render;
+pub mod sampling;
+pub mod chamfer;
+pub mod loss;
+pub mod bundle_adjustment;
+pub mod metrics;
+pub mod training;
+pub mod data;
+
+pub mod checkpoint;
+pub mod config;
+pub mod device;
+pub mod error;
+
+pub use error::{Error, Result};
