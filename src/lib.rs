@@ -22,5 +22,6 @@ pub mod checkpoint;
 pub mod config;
 pub mod device;
 pub mod error;
+mod layers;
 
 pub use error::{Error, Result};
