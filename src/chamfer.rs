@@ -3,10 +3,13 @@
 //! Neighbours are found on the host, outside the graph; the distances to them are on it. The
 //! minimum is differentiated through its winner, which is its derivative wherever it has one.
 
-use burn::tensor::{Int, Tensor, TensorData};
+use burn::tensor::Tensor;
 use rayon::prelude::*;
 
-use crate::nearest_neighbours::nearest_neighbours;
+use crate::{
+    host::{host_points, index_tensor},
+    nearest_neighbours::nearest_neighbours,
+};
 
 /// Eq. 7 for each pair of a batch: the mean of squared distances, both ways added up, `[b]`.
 ///
@@ -39,23 +42,10 @@ pub fn select_points(points: Tensor<3>, point_idx: &[Vec<u32>]) -> Tensor<3> {
     points.reshape([b * n, 3]).select(0, rows).reshape([b, k, 3])
 }
 
-/// Indices on the device of `like`, for `select`.
-pub fn index_tensor<const D: usize>(indices: Vec<i64>, like: &Tensor<D>) -> Tensor<1, Int> {
-    let n_indices = indices.len();
-    Tensor::from_data(TensorData::new(indices, [n_indices]), &like.device().inner())
-}
-
-/// The points of a batch of clouds, one after the other, as single precision.
-pub fn host_points(points: &Tensor<3>) -> Vec<[f32; 3]> {
-    let values = points.clone().inner().into_data().convert::<f32>().into_vec::<f32>();
-    let values = values.expect("converted to f32");
-    values.as_chunks::<3>().0.to_vec()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::Backend;
+    use crate::{device::Backend, host::host_values};
     use burn::tensor::{Distribution, Tolerance};
 
     /// Every pair, without any search.
@@ -100,6 +90,6 @@ mod tests {
     #[test]
     fn a_cloud_is_at_no_distance_from_itself() {
         let (x, _) = clouds();
-        assert_eq!(chamfer_distance(x.clone(), x).into_data().to_vec::<f32>().unwrap(), [0.0; 3]);
+        assert_eq!(host_values(&chamfer_distance(x.clone(), x)), [0.0; 3]);
     }
 }

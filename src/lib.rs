@@ -22,6 +22,7 @@ pub mod checkpoint;
 pub mod config;
 pub mod device;
 pub mod error;
+pub mod host;
 mod layers;
 
 pub use error::{Error, Result};

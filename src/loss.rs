@@ -2,7 +2,7 @@
 
 use burn::tensor::{Tensor, TensorData};
 
-use crate::{chamfer::index_tensor, data::ScalarImage, nearest_neighbours::NearestNeighbours};
+use crate::{data::ScalarImage, host::index_tensor, nearest_neighbours::NearestNeighbours};
 
 /// Coverage above which a pixel belongs to the object.
 pub const MASK_THRESHOLD: f32 = 0.5;
@@ -113,12 +113,4 @@ pub fn silhouette_distances(pixels: Tensor<3>, pairs: &[(usize, SilhouettePairs)
 
     let offsets = pixels.reshape([b * n, 2]).select(0, rows) - targets;
     (offsets.square() * weights).sum()
-}
-
-/// Projected points of each frame on the host, `[b, n, 2]` as b lists of n.
-pub fn host_pixels(pixels: &Tensor<3>) -> Vec<Vec<[f32; 2]>> {
-    let [_, n, _] = pixels.dims();
-    let values = pixels.clone().inner().into_data().convert::<f32>().into_vec::<f32>();
-    let values = values.expect("converted to f32");
-    values.as_chunks::<2>().0.chunks(n).map(<[_]>::to_vec).collect()
 }

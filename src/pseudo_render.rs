@@ -54,7 +54,7 @@ pub fn visible_points(
     let threshold = nearest.clone() / (nearest * config.depth_tolerance + 1.0);
     let visible = inverse_depth.greater_equal(threshold).bool_and(in_frame);
 
-    let visible = visible.into_data().into_vec::<bool>().expect("a mask");
+    let visible = visible.into_data().try_into_vec::<bool>().expect("a mask");
     let of_view = |view: &[bool]| (0..n as u32).filter(|&i| view[i as usize]).collect();
     visible.chunks(n).map(of_view).collect()
 }
@@ -108,7 +108,7 @@ fn nearest_in_window(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{camera::Intrinsics, data::keyed_rng, device::Backend};
+    use crate::{camera::Intrinsics, data::keyed_rng, device::Backend, host::host_values};
     use rand::Rng;
 
     const SIZE: [usize; 2] = [48, 32];
@@ -123,8 +123,8 @@ mod tests {
 
     /// The definition, pair by pair: seen unless a point in the window lies further in front.
     fn by_brute_force(projection: &Projection, config: &PseudoRenderConfig) -> Vec<u32> {
-        let pixels = projection.pixels.to_data().to_vec::<f32>().unwrap();
-        let depth = projection.depth.to_data().to_vec::<f32>().unwrap();
+        let pixels = host_values(&projection.pixels);
+        let depth = host_values(&projection.depth);
         let spacing = (SIZE[0] as f32 * SIZE[1] as f32 / depth.len() as f32).sqrt();
         let cell_size = config.cell_size * spacing;
         let in_frame = |i: usize| {

@@ -2,7 +2,7 @@
 
 use burn::tensor::{Int, Tensor, TensorData, s};
 
-use crate::{chamfer::index_tensor, data::ColorImage};
+use crate::{data::ColorImage, host::index_tensor};
 
 /// Images of one size as a table of pixels, `[l · height · width, 3]`, RGB in [0, 1].
 ///
@@ -60,7 +60,7 @@ impl ImageTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::Backend;
+    use crate::{device::Backend, host::host_values};
     use image::Rgb;
 
     /// A colour that is linear in the location: bilinear interpolation must be exact on it.
@@ -77,7 +77,7 @@ mod tests {
         let table = ImageTable::new(images, &device);
         let at = Tensor::<1>::from_floats(at, &device).reshape([1, 1, 2]);
         let colors = table.sample_bilinear(frames, at.expand([frames.len(), 1, 2]));
-        let colors = colors.into_data().to_vec::<f32>().unwrap();
+        let colors = host_values(&colors);
         for (color, expected) in colors.iter().zip(expected) {
             assert!((color - expected).abs() < 1e-5, "{colors:?} is not {expected:?}");
         }

@@ -10,8 +10,8 @@ use super::{
     unknowns::{Leaves, Parameterisation, Unknowns, flatten},
 };
 use crate::{
-    chamfer::index_tensor,
-    loss::{charbonnier, host_pixels, silhouette_distances, silhouette_pairs},
+    host::{host_pixels, index_tensor},
+    loss::{charbonnier, silhouette_distances, silhouette_pairs},
     pseudo_render::{PseudoRenderConfig, visible_points},
 };
 

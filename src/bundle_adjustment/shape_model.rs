@@ -5,7 +5,7 @@ use burn::tensor::Tensor;
 use crate::shape_prior::Generator;
 
 /// A cloud as a differentiable function of a vector.
-pub trait ShapeModel {
+pub trait ShapeModel: Sync {
     /// `[1, k]` to the cloud `[1, n, 3]`, in the world frame.
     fn points(&self, style: Tensor<2>) -> Tensor<3>;
 }

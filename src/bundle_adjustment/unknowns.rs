@@ -140,7 +140,9 @@ impl Unknowns {
 /// The derivative with respect to each unknown, in the order of `values`.
 pub(super) fn flatten(leaves: &Leaves, gradients: &burn::tensor::Gradients) -> Vec<f64> {
     let of = |leaf: &Tensor<2>| match leaf.grad(gradients) {
-        Some(gradient) => gradient.into_data().convert_dtype(DType::F64).into_vec().expect("f64"),
+        Some(gradient) => {
+            gradient.into_data().convert_dtype(DType::F64).try_into_vec().expect("f64")
+        }
         None => vec![0.0; leaf.dims().iter().product()],
     };
     [of(&leaves.reference_twist), of(&leaves.relative_twists), of(&leaves.style)].concat()
