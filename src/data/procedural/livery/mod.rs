@@ -101,7 +101,7 @@ impl Livery {
             paint,
             roof: if rng.random_bool(0.2) { random_paint(rng) } else { paint },
             decal: random_paint(rng),
-            glass: [0.10, 0.12, 0.15].map(|value: f32| value * rng.random_range(0.6..1.8)),
+            glass: darker([0.10, 0.12, 0.15], rng.random_range(0.6..1.8)),
             trim: [rng.random_range(0.06..0.25); 3],
             accent: [if rng.random_bool(0.6) { bright } else { 0.08 }; 3],
             rim: [rng.random_range(0.35..0.85); 3],
@@ -197,6 +197,7 @@ fn random_paint(rng: &mut impl Rng) -> Color {
     })
 }
 
+/// Scales a colour.
 fn darker(color: Color, factor: f32) -> Color {
     color.map(|value| value * factor)
 }
