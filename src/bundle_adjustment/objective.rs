@@ -43,8 +43,11 @@ pub struct ObjectiveConfig {
     pub target_occlusion: bool,
     /// λ, the weight of L_CD.
     pub silhouette_weight: f32,
-    /// Distance in pixels below which points and silhouette count as matched.
-    pub silhouette_tolerance: f32,
+    /// Distance below which a silhouette's pixel counts as covered by a point, in units of
+    /// √(image area / N), the spacing if the points filled the image.
+    pub coverage_tolerance: f32,
+    /// Distance in pixels below which a point counts as inside the silhouette.
+    pub containment_tolerance: f32,
     /// Let the reference frame's silhouette count, and average over L frames instead of L − 1.
     pub silhouette_of_reference: bool,
     /// Weight of the mean squared style: the whitened style is a unit Gaussian.
@@ -62,7 +65,8 @@ impl Default for ObjectiveConfig {
             within_masks: true,
             target_occlusion: true,
             silhouette_weight: 10.0,
-            silhouette_tolerance: 0.7,
+            coverage_tolerance: 1.0,
+            containment_tolerance: 0.7,
             silhouette_of_reference: true,
             style_weight: 1.0,
             pseudo_render: PseudoRenderConfig::default(),
@@ -81,7 +85,8 @@ impl ObjectiveConfig {
             within_masks: false,
             target_occlusion: false,
             silhouette_weight: 0.01,
-            silhouette_tolerance: 0.0,
+            coverage_tolerance: 0.0,
+            containment_tolerance: 0.0,
             silhouette_of_reference: false,
             style_weight: 0.0,
             pseudo_render: PseudoRenderConfig::default(),
@@ -253,6 +258,10 @@ impl Objective<'_> {
     ) -> Tensor<1> {
         // One frame alone has nothing but its own silhouette.
         let first = usize::from(!self.config.silhouette_of_reference && frames.len() > 1);
+        let [width, height] = self.observations.size.map(|side| side as f32);
+        let spacing = (width * height / host_pixels[0].len() as f32).sqrt();
+        let tolerances =
+            [self.config.coverage_tolerance * spacing, self.config.containment_tolerance];
         let everything: Vec<u32> = (0..host_pixels[0].len() as u32).collect();
         let pairs: Vec<_> = (first..frames.len())
             .into_par_iter()
@@ -266,9 +275,10 @@ impl Objective<'_> {
                         [silhouette.pixels.len(), visible.len()].map(|count| 1.0 / count as f32)
                     }
                 };
-                let tolerance = self.config.silhouette_tolerance;
-                let pixels = &host_pixels[f];
-                Some((f, silhouette_pairs(silhouette, pixels, visible, weights, tolerance)))
+                Some((
+                    f,
+                    silhouette_pairs(silhouette, &host_pixels[f], visible, weights, tolerances),
+                ))
             })
             .collect();
         let n_frames = pairs.len().max(1) as f32;
