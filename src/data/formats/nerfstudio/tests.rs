@@ -6,6 +6,9 @@ use tempfile::TempDir;
 use super::*;
 use crate::data::{ColorImage, ScalarImage, sequence::Frame, viewpoint::look_at};
 
+/// What is wrong with a description.
+type Edit = fn(&mut Value);
+
 fn temporary() -> TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
@@ -101,7 +104,7 @@ fn nerf_s_own_layout_is_read() {
 
 #[test]
 fn broken_descriptions_are_refused() {
-    let edits: [(fn(&mut Value), &str); 12] = [
+    let edits: [(Edit, &str); 12] = [
         (|json| json["frames"] = json!([]), "no frames"),
         (|json| json["frames"] = json!("none"), "invalid type"),
         (|json| json["fl_x"] = json!(0.0), "not positive"),
