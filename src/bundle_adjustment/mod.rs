@@ -2,6 +2,7 @@
 
 pub mod adam;
 pub mod alternating;
+pub mod correspondences;
 pub mod lbfgs;
 pub mod objective;
 pub mod observations;

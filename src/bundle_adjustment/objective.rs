@@ -1,18 +1,18 @@
 //! L = L_ph + λ L_CD (Eq. 6), with what later work added to make it well behaved.
 
 use burn::tensor::{Device, Tensor, TensorData, s};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    correspondences::Correspondences,
     observations::Observations,
     shape_model::ShapeModel,
     unknowns::{Leaves, Parameterisation, Unknowns, flatten},
 };
 use crate::{
-    host::{host_pixels, index_tensor},
-    loss::{charbonnier, silhouette_distances, silhouette_pairs},
-    pseudo_render::{PseudoRenderConfig, visible_points},
+    host::index_tensor,
+    loss::{charbonnier, silhouette_distances},
+    pseudo_render::PseudoRenderConfig,
 };
 
 /// How terms add up over points, pixels and frames.
@@ -104,10 +104,10 @@ pub struct Objective<'a> {
 }
 
 /// L_ph and L_CD on the graph, unweighted, and the number of points that the reference sees.
-pub struct Terms {
-    pub photometric: Tensor<1>,
-    pub silhouette: Tensor<1>,
-    pub n_visible: usize,
+struct Terms {
+    photometric: Tensor<1>,
+    silhouette: Tensor<1>,
+    n_visible: usize,
 }
 
 /// The objective and its gradient at some unknowns, on the host.
@@ -159,7 +159,7 @@ impl Objective<'_> {
     }
 
     /// The terms over the reference frame and some targets, for a cloud `[1, n, 3]`.
-    pub fn terms(
+    fn terms(
         &self,
         unknowns: &Unknowns,
         leaves: &Leaves,
@@ -172,116 +172,45 @@ impl Objective<'_> {
         let poses = unknowns.poses(leaves).select(index_tensor(frame_idx, &points_in_world));
         let points_in_camera = poses.camera_from_world(points_in_world);
         let projection = self.observations.intrinsics.project(points_in_camera);
-        let visible =
-            visible_points(&projection, self.observations.size, &self.config.pseudo_render);
-        let host_pixels = host_pixels(&projection.pixels);
+        let matches = Correspondences::new(self.observations, frames, &projection, self.config);
         let pixels = projection.pixels; // [1 + t, n, 2]
         Terms {
-            photometric: self.photometric(&frames, pixels.clone(), &host_pixels, &visible, level),
-            silhouette: self.silhouette(&frames, pixels, &host_pixels, &visible),
-            n_visible: visible[0].len(),
+            photometric: self.photometric(&matches, pixels.clone(), level),
+            silhouette: silhouette_distances(pixels, &matches.pairs)
+                / matches.pairs.len().max(1) as f32,
+            n_visible: matches.visible[0].len(),
         }
     }
 
     /// L_ph (Eq. 3), over the points that the reference frame sees.
-    fn photometric(
-        &self,
-        frames: &[usize],
-        pixels: Tensor<3>,
-        host_pixels: &[Vec<[f32; 2]>],
-        visible: &[Vec<u32>],
-        level: usize,
-    ) -> Tensor<1> {
+    fn photometric(&self, matches: &Correspondences, pixels: Tensor<3>, level: usize) -> Tensor<1> {
         let [_, n, _] = pixels.dims();
-        let n_targets = frames.len() - 1;
-        let seen = &visible[0];
-        if n_targets == 0 || seen.is_empty() {
-            // Nothing to compare is the worst that can be, not the best: every channel of every
-            // point is as wrong as colours can be.
-            let worst = 3.0 * n_targets as f32;
-            let worst =
-                if self.config.reduction == Reduction::Sum { worst * n as f32 } else { 3.0 };
-            let worst = if n_targets == 0 { 0.0 } else { worst };
+        let (n_targets, seen) = (matches.frames.len() - 1, &matches.visible[0]);
+        if n_targets == 0 {
+            return Tensor::zeros([1], &pixels.device());
+        }
+        if seen.is_empty() {
+            // Nothing to compare is the worst that can be, not the best: all three channels of
+            // every point are as wrong as colours can be.
+            let worst = match self.config.reduction {
+                Reduction::Sum => 3.0 * (n_targets * n) as f32,
+                Reduction::Mean => 3.0,
+            };
             return Tensor::from_floats([worst], &pixels.device());
         }
-
+        let images = &self.observations.images[level];
         let seen_idx = index_tensor(seen.iter().map(|&i| i64::from(i)).collect(), &pixels);
-        let colors =
-            self.observations.images[level].sample_bilinear(frames, pixels.select(1, seen_idx));
+        let colors = images.sample_bilinear(&matches.frames, pixels.select(1, seen_idx));
         let residuals = colors.clone().slice(s![0..1]) - colors.slice(s![1..]); // [t, m, 3]
         let mut squared = residuals.square().sum_dim(2).squeeze_dim::<2>(2);
         if self.config.robust_scale > 0.0 {
             squared = charbonnier(squared, self.config.robust_scale);
         }
-        let mut n_compared = (n_targets * seen.len()) as f32;
-        if self.config.within_masks || self.config.target_occlusion {
-            let weights = self.comparable(frames, host_pixels, visible);
-            n_compared = weights.iter().sum::<f32>().max(1.0);
-            let weights = TensorData::new(weights, [n_targets, seen.len()]);
-            squared = squared * Tensor::from_data(weights, &self.device.clone().inner());
-        }
+        let weights = TensorData::new(matches.comparable.concat(), [n_targets, seen.len()]);
+        let sum = (squared * Tensor::from_data(weights, &self.device.clone().inner())).sum();
         match self.config.reduction {
-            Reduction::Sum => squared.sum(),
-            Reduction::Mean => squared.sum() / n_compared,
+            Reduction::Sum => sum,
+            Reduction::Mean => sum / matches.n_compared(),
         }
-    }
-
-    /// 1 where a target's colour may be compared with the reference's, else 0: `[t · m]`.
-    fn comparable(
-        &self,
-        frames: &[usize],
-        host_pixels: &[Vec<[f32; 2]>],
-        visible: &[Vec<u32>],
-    ) -> Vec<f32> {
-        let of_target = |t: usize| {
-            let mut occluded = vec![self.config.target_occlusion; host_pixels[t].len()];
-            visible[t].iter().for_each(|&i| occluded[i as usize] = false);
-            let in_masks = move |i: usize| {
-                let inside = |f: usize| self.observations.in_mask(frames[f], host_pixels[f][i]);
-                !self.config.within_masks || (inside(0) && inside(t))
-            };
-            visible[0]
-                .iter()
-                .map(move |&i| i as usize)
-                .map(move |i| if !occluded[i] && in_masks(i) { 1.0 } else { 0.0 })
-        };
-        (1..frames.len()).flat_map(of_target).collect()
-    }
-
-    /// L_CD (Eq. 5), averaged over the frames that have a silhouette.
-    fn silhouette(
-        &self,
-        frames: &[usize],
-        pixels: Tensor<3>,
-        host_pixels: &[Vec<[f32; 2]>],
-        visible: &[Vec<u32>],
-    ) -> Tensor<1> {
-        // One frame alone has nothing but its own silhouette.
-        let first = usize::from(!self.config.silhouette_of_reference && frames.len() > 1);
-        let [width, height] = self.observations.size.map(|side| side as f32);
-        let spacing = (width * height / host_pixels[0].len() as f32).sqrt();
-        let tolerances =
-            [self.config.coverage_tolerance * spacing, self.config.containment_tolerance];
-        let everything: Vec<u32> = (0..host_pixels[0].len() as u32).collect();
-        let pairs: Vec<_> = (first..frames.len())
-            .into_par_iter()
-            .filter_map(|f| {
-                let silhouette = self.observations.silhouettes[frames[f]].as_ref()?;
-                // Where nothing is seen, every point is called back.
-                let visible = if visible[f].is_empty() { &everything } else { &visible[f] };
-                let weights = match self.config.reduction {
-                    Reduction::Sum => [1.0; 2],
-                    Reduction::Mean => {
-                        [silhouette.pixels.len(), visible.len()].map(|count| 1.0 / count as f32)
-                    }
-                };
-                Some((
-                    f,
-                    silhouette_pairs(silhouette, &host_pixels[f], visible, weights, tolerances),
-                ))
-            })
-            .collect();
-        let n_frames = pairs.len().max(1) as f32;
-        silhouette_distances(pixels, &pairs) / n_frames
     }
 }
