@@ -1,6 +1,6 @@
 //! What the reconstruction is judged by (Eq. 3, 5): colours that agree, silhouettes that match.
 
-use burn::tensor::{Tensor, TensorData, s};
+use burn::tensor::{Tensor, TensorData};
 
 use crate::{data::ScalarImage, host::index_tensor, nearest_neighbours::NearestNeighbours};
 
@@ -52,12 +52,15 @@ impl Silhouette {
     }
 }
 
-/// The pairs that Eq. 5 adds up for one frame: a projected point each, and the pixel it belongs to.
-#[derive(Default)]
-pub struct SilhouettePairs {
-    point_idx: Vec<u32>,
-    targets: Vec<[f32; 2]>,
-    weights_and_tolerances: Vec<[f32; 2]>,
+/// A projected point, and the silhouette pixel that it belongs to.
+#[derive(Clone, Copy, Debug)]
+pub struct SilhouettePair {
+    pub point_idx: u32,
+    /// The pixel's centre.
+    pub target: [f32; 2],
+    pub weight: f32,
+    /// Distance in pixels from which on the pair counts.
+    pub tolerance: f32,
 }
 
 /// Pairs each silhouette pixel with its nearest projected point, and each point with its nearest
@@ -72,14 +75,12 @@ pub fn silhouette_pairs(
     visible: &[u32],
     weights: [f32; 2],
     tolerances: [f32; 2],
-) -> SilhouettePairs {
-    let mut pairs = SilhouettePairs::default();
+) -> Vec<SilhouettePair> {
+    let mut pairs = Vec::new();
     let mut pair = |point_idx: u32, target: [f32; 2], direction: usize| {
         let ([u, v], tolerance) = (projected[point_idx as usize], tolerances[direction]);
         if (u - target[0]).powi(2) + (v - target[1]).powi(2) > tolerance * tolerance {
-            pairs.point_idx.push(point_idx);
-            pairs.targets.push(target);
-            pairs.weights_and_tolerances.push([weights[direction], tolerance]);
+            pairs.push(SilhouettePair { point_idx, target, weight: weights[direction], tolerance });
         }
     };
     let search = NearestNeighbours::in_plane(visible.iter().map(|&i| projected[i as usize]));
@@ -96,25 +97,26 @@ pub fn silhouette_pairs(
 /// the graph: `[1]`.
 ///
 /// `pixels` are the projected points `[b, n, 2]`; each list of pairs comes with its row of them.
-pub fn silhouette_distances(pixels: Tensor<3>, pairs: &[(usize, SilhouettePairs)]) -> Tensor<1> {
+pub fn silhouette_distances(
+    pixels: Tensor<3>,
+    pairs: &[(usize, Vec<SilhouettePair>)],
+) -> Tensor<1> {
     let [b, n, _] = pixels.dims();
-    let n_pairs: usize = pairs.iter().map(|(_, pairs)| pairs.point_idx.len()).sum();
+    let n_pairs: usize = pairs.iter().map(|(_, pairs)| pairs.len()).sum();
     let device = pixels.device().inner();
     if n_pairs == 0 {
         return Tensor::zeros([1], &device);
     }
-    let rows = pairs.iter().flat_map(|(row, pairs)| {
-        pairs.point_idx.iter().map(move |&point_idx| (row * n + point_idx as usize) as i64)
-    });
+    let all = || pairs.iter().flat_map(|(row, pairs)| pairs.iter().map(move |pair| (row, pair)));
+    let rows = all().map(|(row, pair)| (row * n + pair.point_idx as usize) as i64);
     let rows = index_tensor(rows.collect(), &pixels);
-    let targets: Vec<f32> =
-        pairs.iter().flat_map(|(_, pairs)| pairs.targets.as_flattened()).copied().collect();
-    let targets = Tensor::<2>::from_data(TensorData::new(targets, [n_pairs, 2]), &device);
-    let settings = pairs.iter().flat_map(|(_, p)| p.weights_and_tolerances.as_flattened());
-    let settings = TensorData::new(settings.copied().collect::<Vec<f32>>(), [n_pairs, 2]);
-    let settings = Tensor::<2>::from_data(settings, &device);
-    let (weights, tolerances) =
-        (settings.clone().slice(s![.., 0..1]), settings.slice(s![.., 1..2]));
+    let column = |values: Vec<f32>| {
+        let columns = values.len() / n_pairs;
+        Tensor::<2>::from_data(TensorData::new(values, [n_pairs, columns]), &device)
+    };
+    let targets = column(all().flat_map(|(_, pair)| pair.target).collect());
+    let weights = column(all().map(|(_, pair)| pair.weight).collect());
+    let tolerances = column(all().map(|(_, pair)| pair.tolerance).collect());
 
     let offsets = pixels.reshape([b * n, 2]).select(0, rows) - targets;
     let squared = offsets.square().sum_dim(1); // [pairs, 1]

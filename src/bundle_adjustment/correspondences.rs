@@ -10,7 +10,7 @@ use super::{
 use crate::{
     camera::Projection,
     host::host_pixels,
-    loss::{SilhouettePairs, silhouette_pairs},
+    loss::{SilhouettePair, silhouette_pairs},
     pseudo_render::visible_points,
 };
 
@@ -25,7 +25,7 @@ pub struct Correspondences {
     /// For each target, 1 where a point that the reference sees may be compared, else 0: `[t][m]`.
     pub comparable: Vec<Vec<f32>>,
     /// The silhouette's pairs, each list with its place in `frames`.
-    pub pairs: Vec<(usize, SilhouettePairs)>,
+    pub pairs: Vec<(usize, Vec<SilhouettePair>)>,
 }
 
 impl Correspondences {
@@ -81,7 +81,7 @@ fn pairs(
     pixels: &[Vec<[f32; 2]>],
     visible: &[Vec<u32>],
     config: &ObjectiveConfig,
-) -> Vec<(usize, SilhouettePairs)> {
+) -> Vec<(usize, Vec<SilhouettePair>)> {
     // One frame alone has nothing but its own silhouette.
     let first = usize::from(!config.silhouette_of_reference && frames.len() > 1);
     let [width, height] = observations.size.map(|side| side as f32);

@@ -117,7 +117,7 @@ pub struct Evaluation {
     pub photometric: f64,
     pub silhouette: f64,
     pub n_visible: usize,
-    /// In the order of [`Unknowns::values`].
+    /// In the order of [`Unknowns::values`]; empty where nothing depends on them.
     pub gradient: Vec<f64>,
 }
 
@@ -126,6 +126,22 @@ impl Objective<'_> {
     pub fn evaluate(&self, unknowns: &Unknowns, level: usize) -> Evaluation {
         let targets: Vec<usize> = (1..unknowns.n_frames()).collect();
         self.evaluate_targets(unknowns, &targets, level)
+    }
+
+    /// [`evaluate`](Self::evaluate) without the gradient, which is left empty.
+    pub fn value(&self, unknowns: &Unknowns, level: usize) -> Evaluation {
+        let device = self.device.clone().inner();
+        Objective { device, ..*self }.evaluate(unknowns, level)
+    }
+
+    /// What the current estimate has compared with what, over all frames.
+    pub fn correspondences(&self, unknowns: &Unknowns) -> Correspondences {
+        let leaves = unknowns.leaves(&self.device.clone().inner());
+        let points = self.shape.points(leaves.style.clone()).inner();
+        let points_in_camera = unknowns.poses(&leaves).camera_from_world(points);
+        let projection = self.observations.intrinsics.project(points_in_camera);
+        let frames = (0..unknowns.n_frames()).collect();
+        Correspondences::new(self.observations, frames, &projection, self.config)
     }
 
     /// The objective over the reference frame and some targets.
@@ -153,7 +169,7 @@ impl Objective<'_> {
             n_visible: terms.n_visible,
             gradient: match objective.is_tracked() {
                 true => flatten(&leaves, &objective.backward()),
-                false => vec![0.0; unknowns.values.len()],
+                false => Vec::new(),
             },
         }
     }
