@@ -93,7 +93,8 @@ fn pairs(
         .filter_map(|f| {
             let silhouette = observations.silhouettes[frames[f]].as_ref()?;
             // Where nothing is seen, every point is called back.
-            let visible = if visible[f].is_empty() { &everything } else { &visible[f] };
+            let all = config.silhouette_of_hidden_points || visible[f].is_empty();
+            let visible = if all { &everything } else { &visible[f] };
             let weights = match config.reduction {
                 Reduction::Sum => [1.0; 2],
                 Reduction::Mean => [silhouette.pixels.len(), visible.len()].map(|n| 1.0 / n as f32),

@@ -50,6 +50,9 @@ pub struct ObjectiveConfig {
     pub containment_tolerance: f32,
     /// Let the reference frame's silhouette count, and average over L frames instead of L − 1.
     pub silhouette_of_reference: bool,
+    /// Let hidden points count in the silhouette, too: they lie inside it as well, and close the
+    /// gaps between the visible ones.
+    pub silhouette_of_hidden_points: bool,
     /// Weight of the mean squared style: the whitened style is a unit Gaussian.
     pub style_weight: f32,
     pub pseudo_render: PseudoRenderConfig,
@@ -68,6 +71,7 @@ impl Default for ObjectiveConfig {
             coverage_tolerance: 1.0,
             containment_tolerance: 0.7,
             silhouette_of_reference: true,
+            silhouette_of_hidden_points: true,
             style_weight: 1.0,
             pseudo_render: PseudoRenderConfig::default(),
         }
@@ -88,6 +92,7 @@ impl ObjectiveConfig {
             coverage_tolerance: 0.0,
             containment_tolerance: 0.0,
             silhouette_of_reference: false,
+            silhouette_of_hidden_points: false,
             style_weight: 0.0,
             pseudo_render: PseudoRenderConfig::default(),
         }
