@@ -10,6 +10,7 @@ pub mod shape_prior;
 pub mod regressor;
 pub mod pseudo_render;
 pub mod sampling;
+pub mod nearest_neighbours;
 pub mod chamfer;
 pub mod loss;
 pub mod bundle_adjustment;
@@ -21,6 +22,7 @@ pub mod checkpoint;
 pub mod config;
 pub mod device;
 pub mod error;
+pub mod host;
 mod layers;
 
 pub use error::{Error, Result};

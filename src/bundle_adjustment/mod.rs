@@ -1,1 +1,227 @@
-//! (to come)
+//! Sec. 2.3: poses and style, adjusted together until the frames agree.
+
+pub mod adam;
+pub mod alternating;
+pub mod lbfgs;
+pub mod objective;
+pub mod observations;
+pub mod shape_model;
+pub mod unknowns;
+
+use burn::tensor::Device;
+use serde::{Deserialize, Serialize};
+
+use self::{
+    adam::{Adam, AdamConfig},
+    alternating::AlternatingConfig,
+    objective::{Evaluation, Objective, ObjectiveConfig},
+    observations::Observations,
+    shape_model::ShapeModel,
+    unknowns::Unknowns,
+};
+use crate::data::sequence::Sequence;
+
+/// How the objective is minimised.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Solver {
+    /// All unknowns together, by Adam.
+    #[default]
+    Adam,
+    /// Algorithm 1 as printed: L-BFGS on each Δp_l in parallel, then p_0, then s.
+    AlternatingLbfgs,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BundleAdjustmentConfig {
+    pub solver: Solver,
+    /// Blur of the frames at each level, coarse to fine: a Gaussian's standard deviation in pixels.
+    pub blurs: Vec<f32>,
+    /// Initial poses that are tried at the first level; the one with the least objective goes on.
+    pub n_hypotheses: usize,
+    pub objective: ObjectiveConfig,
+    pub adam: AdamConfig,
+    pub alternating: AlternatingConfig,
+}
+
+impl Default for BundleAdjustmentConfig {
+    fn default() -> Self {
+        Self {
+            solver: Solver::Adam,
+            blurs: vec![3.0, 1.5, 0.7, 0.0],
+            n_hypotheses: 2,
+            objective: ObjectiveConfig::default(),
+            adam: AdamConfig::default(),
+            alternating: AlternatingConfig::default(),
+        }
+    }
+}
+
+impl BundleAdjustmentConfig {
+    /// Algorithm 1 on Eq. 6, as the paper prints them.
+    pub fn paper() -> Self {
+        Self {
+            solver: Solver::AlternatingLbfgs,
+            blurs: vec![0.0],
+            n_hypotheses: 1,
+            objective: ObjectiveConfig::paper(),
+            ..Self::default()
+        }
+    }
+}
+
+/// Why a solver stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// The loss is small enough, or no longer falls.
+    Converged,
+    /// All iterations are used.
+    BudgetSpent,
+    /// The objective ceased to be finite; the last good unknowns are returned.
+    NotFinite,
+}
+
+/// One line of the history: the solver's own terms, on blurred images where it blurs them.
+#[derive(Clone, Debug, Serialize)]
+pub struct Step {
+    pub iteration: usize,
+    pub hypothesis: usize,
+    /// Blur of the frames in pixels.
+    pub blur: f32,
+    pub block: String,
+    pub objective: f64,
+    pub photometric: f64,
+    pub silhouette: f64,
+    pub n_visible: usize,
+}
+
+/// Collects what a solver reports, and passes it on.
+pub struct Progress<'a> {
+    observe: &'a mut dyn FnMut(&Step, &Unknowns),
+    stages: Vec<(String, Unknowns)>,
+    iteration: usize,
+    hypothesis: usize,
+    blur: f32,
+}
+
+impl Progress<'_> {
+    fn report(&mut self, block: &str, evaluation: &Evaluation, unknowns: &Unknowns) {
+        let step = Step {
+            iteration: self.iteration,
+            hypothesis: self.hypothesis,
+            blur: self.blur,
+            block: block.into(),
+            objective: evaluation.objective,
+            photometric: evaluation.photometric,
+            silhouette: evaluation.silhouette,
+            n_visible: evaluation.n_visible,
+        };
+        self.iteration += 1;
+        (self.observe)(&step, unknowns);
+    }
+
+    fn end_stage(&mut self, name: &str, unknowns: &Unknowns) {
+        self.stages.push((name.into(), unknowns.clone()));
+    }
+}
+
+/// What bundle adjustment found.
+pub struct Outcome {
+    pub unknowns: Unknowns,
+    pub status: Status,
+    /// The unknowns after each stage, the initial ones first (Fig. 5).
+    pub stages: Vec<(String, Unknowns)>,
+    /// Evaluations that were reported, over all hypotheses.
+    pub iterations: usize,
+}
+
+/// Adjusts poses and shape to a sequence, from one or several initial guesses, likeliest first.
+///
+/// `device` carries the graph and differentiates. Panics without a hypothesis or a blur level.
+pub fn bundle_adjust(
+    sequence: &Sequence,
+    shape: &dyn ShapeModel,
+    hypotheses: &[Unknowns],
+    config: &BundleAdjustmentConfig,
+    device: &Device,
+    observe: &mut dyn FnMut(&Step, &Unknowns),
+) -> Outcome {
+    let observations = Observations::new(sequence, &config.blurs, device);
+    let objective = Objective {
+        observations: &observations,
+        shape,
+        config: &config.objective,
+        device: device.clone(),
+    };
+    let mut progress =
+        Progress { observe, stages: Vec::new(), iteration: 0, hypothesis: 0, blur: 0.0 };
+    progress.end_stage("initial", &hypotheses[0]);
+
+    let hypotheses = &hypotheses[..hypotheses.len().min(config.n_hypotheses.max(1))];
+    let mut runs: Vec<Run> = hypotheses.iter().map(Run::new).collect();
+    for (idx, run) in runs.iter_mut().enumerate() {
+        progress.hypothesis = idx;
+        run.advance(&objective, 0, config, &mut progress);
+    }
+    let cost = |run: &Run| objective.evaluate(&run.unknowns, 0).objective;
+    let costs: Vec<f64> = runs.iter().map(cost).collect();
+    let best =
+        (0..runs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).expect("a hypothesis");
+    let mut run = runs.swap_remove(best);
+    progress.hypothesis = best;
+    progress.stages.retain(|(name, _)| name == "initial" || runs.is_empty());
+    if !runs.is_empty() {
+        progress.end_stage(&format!("blur {}", config.blurs[0]), &run.unknowns);
+    }
+    for level in 1..config.blurs.len() {
+        if run.status == Status::NotFinite {
+            break;
+        }
+        run.advance(&objective, level, config, &mut progress);
+    }
+    Outcome {
+        unknowns: run.unknowns,
+        status: run.status,
+        iterations: progress.iteration,
+        stages: progress.stages,
+    }
+}
+
+/// One hypothesis on its way.
+struct Run {
+    unknowns: Unknowns,
+    adam: Adam,
+    status: Status,
+}
+
+impl Run {
+    fn new(initial: &Unknowns) -> Self {
+        let (unknowns, adam) = (initial.clone(), Adam::new(initial));
+        Self { unknowns, adam, status: Status::BudgetSpent }
+    }
+
+    fn advance(
+        &mut self,
+        objective: &Objective,
+        level: usize,
+        config: &BundleAdjustmentConfig,
+        progress: &mut Progress,
+    ) {
+        progress.blur = config.blurs[level];
+        let levels = [level, config.blurs.len()];
+        self.status = match config.solver {
+            Solver::Adam => {
+                self.adam.run(objective, &mut self.unknowns, levels, &config.adam, progress)
+            }
+            Solver::AlternatingLbfgs => {
+                let config = &config.alternating;
+                alternating::run(objective, &mut self.unknowns, level, config, progress)
+            }
+        };
+        if config.solver == Solver::Adam {
+            progress.end_stage(&format!("blur {}", progress.blur), &self.unknowns);
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Algorithm 1: L-BFGS on each Δp_l in parallel, then on p_0, then on s, and around again.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Progress, Status,
+    lbfgs::{LbfgsConfig, Sample, minimise},
+    objective::{Evaluation, Objective},
+    shape_model::KnownPoints,
+    unknowns::Unknowns,
+};
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AlternatingConfig {
+    /// Most rounds over the three blocks.
+    pub max_rounds: usize,
+    /// δ_L: stops when the photometric loss is no greater.
+    pub loss_tolerance: f64,
+    /// One block's L-BFGS.
+    pub lbfgs: LbfgsConfig,
+}
+
+impl Default for AlternatingConfig {
+    fn default() -> Self {
+        Self { max_rounds: 5, loss_tolerance: 1.0, lbfgs: LbfgsConfig::default() }
+    }
+}
+
+/// Runs Algorithm 1 at one level of blur.
+///
+/// It loops "while L_ph > δ_L or step < maximum" in print, which would not end; "and" is meant.
+pub fn run(
+    objective: &Objective,
+    unknowns: &mut Unknowns,
+    level: usize,
+    config: &AlternatingConfig,
+    progress: &mut Progress,
+) -> Status {
+    let mut previous = objective.evaluate(unknowns, level);
+    progress.report("initial", &previous, unknowns);
+    for round in 0..config.max_rounds {
+        if !previous.objective.is_finite() {
+            return Status::NotFinite;
+        }
+        if previous.photometric <= config.loss_tolerance {
+            return Status::Converged;
+        }
+        update_relative_poses(objective, unknowns, level, &config.lbfgs);
+        progress.report("relative poses", &objective.evaluate(unknowns, level), unknowns);
+        update_block(objective, unknowns, Unknowns::REFERENCE, level, &config.lbfgs);
+        progress.report("reference pose", &objective.evaluate(unknowns, level), unknowns);
+        update_block(objective, unknowns, unknowns.style(), level, &config.lbfgs);
+        let current = objective.evaluate(unknowns, level);
+        progress.report("style", &current, unknowns);
+        progress.end_stage(&format!("round {}", round + 1), unknowns);
+        if previous.objective - current.objective <= 1e-4 * current.objective.abs() {
+            return Status::Converged;
+        }
+        previous = current;
+    }
+    Status::BudgetSpent
+}
+
+/// Line 5 and 6: the frames do not meet while the shape and p_0 stand still.
+fn update_relative_poses(
+    objective: &Objective,
+    unknowns: &mut Unknowns,
+    level: usize,
+    config: &LbfgsConfig,
+) {
+    let style = unknowns.leaves(&objective.device.clone().inner()).style;
+    let points = objective.shape.points(style).inner();
+    let updated: Vec<Sample> = (1..unknowns.n_frames())
+        .into_par_iter()
+        .map(|l| {
+            let shape = KnownPoints(points.clone());
+            let objective =
+                Objective { shape: &shape, device: objective.device.clone(), ..*objective };
+            let range = Unknowns::relative(l);
+            let cost = block_cost(unknowns, range.clone(), |unknowns| {
+                objective.evaluate_targets(unknowns, &[l], level)
+            });
+            minimise(cost, &unknowns.values[range], config)
+        })
+        .collect();
+    for (l, sample) in (1..).zip(updated) {
+        unknowns.values[Unknowns::relative(l)].copy_from_slice(&sample.x);
+    }
+}
+
+/// Lines 7 and 8: one block over all frames.
+fn update_block(
+    objective: &Objective,
+    unknowns: &mut Unknowns,
+    range: Range<usize>,
+    level: usize,
+    config: &LbfgsConfig,
+) {
+    let cost = block_cost(unknowns, range.clone(), |x| objective.evaluate(x, level));
+    let updated = minimise(cost, &unknowns.values[range.clone()], config);
+    unknowns.values[range].copy_from_slice(&updated.x);
+}
+
+/// The objective as a function of the unknowns in `range` alone.
+fn block_cost(
+    unknowns: &Unknowns,
+    range: Range<usize>,
+    evaluate: impl Fn(&Unknowns) -> Evaluation,
+) -> impl FnMut(&[f64]) -> (f64, Vec<f64>) {
+    let mut unknowns = unknowns.clone();
+    move |x| {
+        unknowns.values[range.clone()].copy_from_slice(x);
+        let Evaluation { objective, gradient, .. } = evaluate(&unknowns);
+        (objective, gradient[range.clone()].to_vec())
+    }
+}

@@ -1,0 +1,149 @@
+//! {p_0, Δp_l, s}: what bundle adjustment solves for, as one flat vector that solvers share.
+
+use std::ops::Range;
+
+use burn::tensor::{DType, Device, Tensor, TensorData};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::camera::Pose;
+
+/// How Δp_l acts on p_0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Parameterisation {
+    /// About the object, ΔR_l R_0 x + t_0 + Δt_l: turning and moving hardly interact.
+    #[default]
+    ObjectCentred,
+    /// About the camera, ΔR_l (R_0 x + t_0) + Δt_l: Eq. 4.
+    CameraCentred,
+}
+
+/// The unknowns: p_0, as a twist about the initial reference pose, then each Δp_l, then the style.
+///
+/// Twists are `[φn, t]`, radians and world units, in SO(3) × R³.
+#[derive(Clone, Debug)]
+pub struct Unknowns {
+    pub values: Vec<f64>,
+    n_frames: usize,
+    initial_reference: Isometry3<f32>,
+    parameterisation: Parameterisation,
+}
+
+/// The unknowns as leaves of the graph.
+pub struct Leaves {
+    pub reference_twist: Tensor<2>, // [1, 6]
+    pub relative_twists: Tensor<2>, // [L − 1, 6]
+    pub style: Tensor<2>,           // [1, k]
+}
+
+impl Unknowns {
+    /// The paper's initialisation: p_0 and s from the regressors, every Δp_l zero.
+    pub fn new(
+        reference_pose: Isometry3<f32>,
+        n_frames: usize,
+        style: &[f32],
+        parameterisation: Parameterisation,
+    ) -> Self {
+        let mut values = vec![0.0; 6 * n_frames];
+        values.extend(style.iter().map(|&s| f64::from(s)));
+        Self { values, n_frames, initial_reference: reference_pose, parameterisation }
+    }
+
+    /// Starts every frame from a pose of its own.
+    pub fn with_poses(
+        camera_from_world: &[Isometry3<f32>],
+        style: &[f32],
+        parameterisation: Parameterisation,
+    ) -> Self {
+        let reference = camera_from_world[0];
+        let mut unknowns = Self::new(reference, camera_from_world.len(), style, parameterisation);
+        for (l, pose) in camera_from_world.iter().enumerate().skip(1) {
+            let turn: UnitQuaternion<f32> = pose.rotation * reference.rotation.inverse();
+            let start: Vector3<f32> = match parameterisation {
+                Parameterisation::ObjectCentred => reference.translation.vector,
+                Parameterisation::CameraCentred => turn * reference.translation.vector,
+            };
+            let shift = pose.translation.vector - start;
+            let twist =
+                turn.scaled_axis().iter().chain(shift.iter()).map(|&x| f64::from(x)).collect();
+            unknowns.values.splice(Self::relative(l), Vec::<f64>::into_iter(twist));
+        }
+        unknowns
+    }
+
+    /// Where p_0 lies in `values`.
+    pub const REFERENCE: Range<usize> = 0..6;
+
+    /// Where Δp_l lies in `values`, for 1 ≤ l < L.
+    pub fn relative(l: usize) -> Range<usize> {
+        6 * l..6 * l + 6
+    }
+
+    /// Where all the Δp_l lie in `values`.
+    pub fn relatives(&self) -> Range<usize> {
+        6..6 * self.n_frames
+    }
+
+    /// Where the style lies in `values`.
+    pub fn style(&self) -> Range<usize> {
+        6 * self.n_frames..self.values.len()
+    }
+
+    pub fn n_frames(&self) -> usize {
+        self.n_frames
+    }
+
+    /// The unknowns on `device`, tracked when it differentiates, in its default precision.
+    pub fn leaves(&self, device: &Device) -> Leaves {
+        let leaf = |range: Range<usize>, columns: usize| {
+            let data = TensorData::new(
+                self.values[range.clone()].to_vec(),
+                [range.len() / columns, columns],
+            );
+            let leaf = Tensor::<2>::from_data(data, device);
+            if device.is_autodiff() { leaf.require_grad() } else { leaf }
+        };
+        Leaves {
+            reference_twist: leaf(Self::REFERENCE, 6),
+            relative_twists: leaf(self.relatives(), 6),
+            style: leaf(self.style(), self.style().len().max(1)),
+        }
+    }
+
+    /// p_0 and each p_l = p_0 ∘ Δp_l, in order, `[L, …]`.
+    pub fn poses(&self, leaves: &Leaves) -> Pose {
+        let device = leaves.reference_twist.device();
+        let initial = Pose::from_isometries(&[self.initial_reference], &device);
+        let reference = initial.turned_by(Pose::from_twist(leaves.reference_twist.clone()));
+        if self.n_frames == 1 {
+            return reference;
+        }
+        let relative_poses = Pose::from_twist(leaves.relative_twists.clone());
+        let targets = match self.parameterisation {
+            Parameterisation::ObjectCentred => reference.clone().turned_by(relative_poses),
+            Parameterisation::CameraCentred => reference.clone().then(relative_poses),
+        };
+        reference.and(targets)
+    }
+
+    /// The pose of every frame on the host.
+    pub fn camera_from_world(&self, device: &Device) -> Vec<Isometry3<f32>> {
+        self.poses(&self.leaves(&device.clone().inner())).to_isometries()
+    }
+
+    pub fn style_values(&self) -> Vec<f32> {
+        self.values[self.style()].iter().map(|&s| s as f32).collect()
+    }
+}
+
+/// The derivative with respect to each unknown, in the order of `values`.
+pub(super) fn flatten(leaves: &Leaves, gradients: &burn::tensor::Gradients) -> Vec<f64> {
+    let of = |leaf: &Tensor<2>| match leaf.grad(gradients) {
+        Some(gradient) => {
+            gradient.into_data().convert_dtype(DType::F64).try_into_vec().expect("f64")
+        }
+        None => vec![0.0; leaf.dims().iter().product()],
+    };
+    [of(&leaves.reference_twist), of(&leaves.relative_twists), of(&leaves.style)].concat()
+}
