@@ -28,6 +28,8 @@ pub(crate) const COARSEST_SIDE: usize = 4;
 pub struct ShapePriorConfig {
     /// Numbers in a latent; the style keeps those directions along which shapes differ.
     pub n_latent: usize,
+    /// Points that the encoder is trained on; it sees other numbers less well.
+    pub n_encoder_points: usize,
     /// Widths of the layers that see a point alone.
     pub encoder_widths: [usize; 3],
     /// Points of the fully connected branch, and the width of its last hidden layer.
@@ -43,6 +45,7 @@ impl Default for ShapePriorConfig {
     fn default() -> Self {
         Self {
             n_latent: 64,
+            n_encoder_points: 1024,
             encoder_widths: [64, 128, 256],
             n_fc_points: 2048,
             fc_width: 512,
@@ -60,7 +63,9 @@ impl ShapePriorConfig {
 
     /// Why no network has these sizes, if none has.
     pub fn check(&self) -> Result<(), String> {
-        let sizes = [self.n_latent, self.n_fc_points, self.fc_width, self.grid_channels];
+        let (n_latent, n_encoder_points) = (self.n_latent, self.n_encoder_points);
+        let sizes =
+            [n_latent, n_encoder_points, self.n_fc_points, self.fc_width, self.grid_channels];
         if sizes.iter().chain(&self.encoder_widths).any(|&size| size == 0) {
             return Err("the sizes of the shape prior must be positive".into());
         }
@@ -120,6 +125,7 @@ pub(crate) mod tests {
     pub fn tiny() -> ShapePriorConfig {
         ShapePriorConfig {
             n_latent: 6,
+            n_encoder_points: 50,
             encoder_widths: [8, 8, 16],
             n_fc_points: 64,
             fc_width: 32,
