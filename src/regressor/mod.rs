@@ -29,6 +29,8 @@ use crate::{
 pub struct RegressorConfig {
     /// Side of the square crops that they see, in pixels.
     pub crop_size: usize,
+    /// What these leave around the object on each side, as a share of the crop's side.
+    pub crop_margin: f32,
     /// Channels after each halving of the crop.
     pub channels: Vec<usize>,
     /// Width of the feature that the heads share, and of the pose head's hidden layer.
@@ -41,6 +43,7 @@ impl Default for RegressorConfig {
     fn default() -> Self {
         Self {
             crop_size: 64,
+            crop_margin: 0.1,
             channels: vec![32, 48, 64, 96],
             feature_width: 256,
             head: PoseHead::Anchors,
@@ -53,6 +56,9 @@ impl RegressorConfig {
     pub fn check(&self) -> Result<(), String> {
         if self.channels.is_empty() || self.channels.contains(&0) || self.feature_width == 0 {
             return Err("the sizes of the regressors must be positive".into());
+        }
+        if !(0.0..0.5).contains(&self.crop_margin) {
+            return Err(format!("crop_margin is {}, not within [0, 0.5)", self.crop_margin));
         }
         let coarsest = 1usize.checked_shl(self.channels.len() as u32).unwrap_or(0);
         if coarsest == 0 || self.crop_size < coarsest || self.crop_size % coarsest != 0 {
@@ -68,6 +74,7 @@ impl RegressorConfig {
             style: StyleRegressor::new(self.feature_width, n_style, device),
             pose: PoseRegressor::new(self.head, self.feature_width, device),
             crop_size: self.crop_size,
+            crop_margin: self.crop_margin,
         }
     }
 }
@@ -80,6 +87,8 @@ pub struct Regressors {
     pub pose: PoseRegressor,
     #[module(skip)]
     crop_size: usize,
+    #[module(skip)]
+    crop_margin: f32,
 }
 
 /// Where to start: what the regressors read off one picture.
@@ -96,6 +105,11 @@ impl Regressors {
     /// Side of the square crops to give to [`regress`](Self::regress), in pixels.
     pub fn crop_size(&self) -> usize {
         self.crop_size
+    }
+
+    /// What to leave around the object on each side, as a share of the crop's side.
+    pub fn crop_margin(&self) -> f32 {
+        self.crop_margin
     }
 
     /// The style and the poses of the object in a crop, whose background may hold anything.

@@ -105,6 +105,11 @@ pub struct ShapePrior {
 }
 
 impl ShapePrior {
+    /// Numbers in a style.
+    pub fn n_style(&self) -> usize {
+        self.generator.n_style()
+    }
+
     /// Styles `[b, k]` of clouds `[b, n, 3]`, in world units; any number of surface points will do.
     pub fn encode(&self, points: Tensor<3>) -> Tensor<2> {
         self.generator.whitening.style_from_latent(self.encoder.forward(points))

@@ -1,12 +1,15 @@
 //! What a training run is: presets state what differs from these defaults.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Error, Result, config::read_config, data::viewpoint::ViewpointRange,
-    regressor::RegressorConfig, shape_prior::ShapePriorConfig,
+    Error, Result, data::viewpoint::ViewpointRange, regressor::RegressorConfig,
+    shape_prior::ShapePriorConfig,
 };
 
 /// A whole run: two runs of one config give the same weights.
@@ -39,7 +42,7 @@ pub struct DataConfig {
     pub shapenet: Option<PathBuf>,
     /// The category there; 02958343 are cars.
     pub synset: String,
-    /// Which model ids to take and which of these to leave, `*` standing for anything.
+    /// Which model ids to take (all, if empty) and which of these to leave; `*` is anything.
     pub include: Vec<String>,
     pub exclude: Vec<String>,
 }
@@ -56,7 +59,7 @@ impl Default for DataConfig {
             viewpoints: ViewpointRange::default(),
             shapenet: None,
             synset: "02958343".into(),
-            include: vec!["*".into()],
+            include: Vec::new(),
             exclude: Vec::new(),
         }
     }
@@ -153,8 +156,15 @@ impl Schedule {
 impl TrainingConfig {
     /// Reads a preset, and refuses what could not be trained.
     pub fn read(path: &Path) -> Result<Self> {
-        let config: Self = read_config(path)?;
-        config.check().map_err(|reason| Error::Config { path: path.into(), reason })?;
+        let text = fs::read_to_string(path).map_err(Error::io(path))?;
+        Self::parse(&text, path)
+    }
+
+    /// The config in a text, which errors say is at `path`.
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
+        let invalid = |reason| Error::Config { path: path.into(), reason };
+        let config: Self = toml::from_str(text).map_err(|error| invalid(error.to_string()))?;
+        config.check().map_err(invalid)?;
         Ok(config)
     }
 

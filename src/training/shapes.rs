@@ -11,7 +11,7 @@ use crate::{
         keyed_rng,
         mesh::Mesh,
         procedural::CarParameters,
-        shapenet::{self, Model},
+        shapenet::{Model, find_models, select_models},
         surface::sample_surface,
     },
 };
@@ -42,8 +42,8 @@ impl Shapes {
             let (n_training, n_validation) = (config.n_models, config.n_validation);
             return Ok(Self { source: Source::ProceduralCars, seed, n_training, n_validation });
         };
-        let mut models = shapenet::find_models(root, &config.synset)?;
-        models.retain(|model| shapenet::selected(&model.id, &config.include, &config.exclude));
+        let models = find_models(root, &config.synset)?;
+        let mut models = select_models(models, &config.include, &config.exclude);
         if models.len() <= config.n_validation {
             let (found, held_out) = (models.len(), config.n_validation);
             let reason = format!("{found} models match, of which {held_out} are to be held out");
