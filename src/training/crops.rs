@@ -52,7 +52,13 @@ pub(super) fn render_crops(
                 let renderer = Renderer::new(&mesh);
                 for view in (paint..n_views).step_by(paints) {
                     let mut rng = keyed_rng(config.seed, [VIEW + view as u64, model_idx as u64]);
-                    crops.extend(render_crop(config, &mesh.vertices, &renderer, shape_idx, &mut rng));
+                    crops.extend(render_crop(
+                        config,
+                        &mesh.vertices,
+                        &renderer,
+                        shape_idx,
+                        &mut rng,
+                    ));
                 }
             }
             progress();

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use burn::{module::Module, tensor::{Device, Tensor}};
+use burn::{
+    module::Module,
+    tensor::{Device, Tensor},
+};
 use indicatif::ProgressBar;
 use rand::Rng;
 
@@ -82,7 +85,8 @@ impl<'a> RegressorStage<'a> {
         let autodiff = self.device.clone().autodiff();
         let init = || self.config.regressors.network.init(self.prior.n_style(), &autodiff);
         let regressors = seeded(self.device, self.config.seed + 1, init);
-        let deviations = Tensor::from_data(self.prior.generator.deviations().into_data(), &autodiff);
+        let deviations =
+            Tensor::from_data(self.prior.generator.deviations().into_data(), &autodiff);
         self.stage.train(
             regressors,
             |regressors, step| self.loss(regressors, step, deviations.clone(), &autodiff),
@@ -116,8 +120,7 @@ impl<'a> RegressorStage<'a> {
         let targets: Vec<_> =
             truths.iter().map(|crop| self.training.styles[crop.shape_idx].clone()).collect();
         let pose_targets: Vec<_> = truths.iter().map(pose_target).collect();
-        let style_loss =
-            regressors.style.loss(styles, row_tensor(&targets, device), deviations);
+        let style_loss = regressors.style.loss(styles, row_tensor(&targets, device), deviations);
         vec![("pose", regressors.pose.loss(poses, &pose_targets)), ("style", style_loss)]
     }
 
@@ -171,8 +174,7 @@ impl<'a> RegressorStage<'a> {
         let (mut regressed, mut encoded) = (0.0, 0.0);
         for (crop, truth) in crops.zip(&self.truth) {
             let crop = std::slice::from_ref(crop);
-            let (style, _) =
-                self.forward(regressors, &[crop[0].values()], crop, self.device);
+            let (style, _) = self.forward(regressors, &[crop[0].values()], crop, self.device);
             let known = &self.held_out.styles[crop[0].shape_idx];
             regressed += chamfer(style, truth);
             encoded += chamfer(row_tensor(std::slice::from_ref(known), self.device), truth);
@@ -200,7 +202,8 @@ fn encode(prior: &ShapePrior, surfaces: &[Surface], device: &Device) -> Vec<Vec<
         let clouds: Vec<_> = chunk.iter().map(|Surface(points)| points.clone()).collect();
         host_values(&prior.encode(cloud_tensor(&clouds, device)))
     });
-    chunks.flat_map(|styles| styles.chunks(prior.n_style()).map(<[_]>::to_vec).collect::<Vec<_>>())
+    chunks
+        .flat_map(|styles| styles.chunks(prior.n_style()).map(<[_]>::to_vec).collect::<Vec<_>>())
         .collect()
 }
 

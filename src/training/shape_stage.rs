@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use burn::{module::Module, tensor::{Device, Tensor}};
+use burn::{
+    module::Module,
+    tensor::{Device, Tensor},
+};
 use nalgebra::DMatrix;
 use rand::Rng;
 use rayon::prelude::*;
@@ -146,12 +149,17 @@ impl<'a> ShapeStage<'a> {
     /// Latents of all training shapes, one a row.
     fn encode(&self, prior: &ShapePrior) -> DMatrix<f64> {
         let n_seen = self.config.prior.network.n_encoder_points;
-        let clouds: Vec<_> = self.training.iter().enumerate().map(|(i, surface)| {
-            surface.draw(n_seen, &mut keyed_rng(self.config.seed, [ENCODING, i as u64]))
-        }).collect();
-        let latents = clouds.chunks(CHUNK).flat_map(|clouds| {
-            host_values(&prior.encode(cloud_tensor(clouds, self.device)))
-        });
+        let clouds: Vec<_> = self
+            .training
+            .iter()
+            .enumerate()
+            .map(|(i, surface)| {
+                surface.draw(n_seen, &mut keyed_rng(self.config.seed, [ENCODING, i as u64]))
+            })
+            .collect();
+        let latents = clouds
+            .chunks(CHUNK)
+            .flat_map(|clouds| host_values(&prior.encode(cloud_tensor(clouds, self.device))));
         let latents: Vec<f64> = latents.map(f64::from).collect();
         DMatrix::from_row_slice(clouds.len(), latents.len() / clouds.len(), &latents)
     }
@@ -226,7 +234,8 @@ mod tests {
         let (one, other) = ([scattered(0, 500)], [scattered(1, 400)]);
         let mut rng = keyed_rng(2, [0, 0]);
         let sampled = sampled_chamfer(cloud_tensor(&one, &device), &other, 20_000, &mut rng);
-        let (sampled, whole) = (f64::from(host_values(&sampled)[0]), chamfer(&one, &other, &device));
+        let (sampled, whole) =
+            (f64::from(host_values(&sampled)[0]), chamfer(&one, &other, &device));
         assert!((sampled / whole - 1.0).abs() < 0.03, "{sampled} for {whole}");
     }
 }

@@ -70,7 +70,8 @@ impl Shapes {
     pub fn mesh(&self, model_idx: usize, paint: usize) -> Result<Mesh> {
         match &self.source {
             Source::ProceduralCars => {
-                let car = CarParameters::random(&mut keyed_rng(self.seed, [SHAPE, model_idx as u64]));
+                let car =
+                    CarParameters::random(&mut keyed_rng(self.seed, [SHAPE, model_idx as u64]));
                 Ok(car.mesh(&mut keyed_rng(self.seed, [PAINT + paint as u64, model_idx as u64])))
             }
             Source::ShapeNet(models) => Ok(models[model_idx].load()?.mesh),
