@@ -94,8 +94,7 @@ impl View<'_> {
         }
         let ray = self.ray(pixel);
         let point = self.eye + ray * face.depth_at(pixel);
-        let [a, b, c] = face.triangle.vertices.map(|idx| mesh.vertices[idx as usize]);
-        let normal = (b - a).cross(&(c - a)).normalize();
+        let normal = mesh.area_vector(face.triangle).normalize();
         // Files wind their triangles as they like: what is seen is the outside.
         let outward = if normal.dot(&ray) > 0.0 { -normal } else { normal };
         self.scene.shade(point, outward, albedo)
