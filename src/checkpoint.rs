@@ -76,7 +76,8 @@ pub fn load_regressors(
 pub fn save_weights<M: Module>(module: &M, path: &Path) -> Result<()> {
     // Linear layers, and the template, which is the generator's own.
     let half = HalfPrecisionAdapter::new().with_module("Generator");
-    let mut store = SafetensorsStore::from_bytes(None).with_to_adapter(half);
+    // Metadata come in any order; without them, equal weights are equal files.
+    let mut store = SafetensorsStore::from_bytes(None).clear_metadata().with_to_adapter(half);
     let unusable = |reason: String| Error::Prior { path: path.into(), reason };
     module.valid().save_into(&mut store).map_err(|error| unusable(error.to_string()))?;
     write_atomically(path, &store.get_bytes().map_err(|error| unusable(error.to_string()))?)

@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::stage::Measurements;
 use crate::{Error, Result};
@@ -44,19 +44,21 @@ impl MetricsFile {
         measurements: &Measurements,
     ) -> Result<()> {
         let seconds = (elapsed.as_secs_f64() * 10.0).round() / 10.0;
-        self.write(json!({ "step": step, "seconds": seconds }), measurements)
+        self.write(&[("step", json!(step)), ("seconds", json!(seconds))], measurements)
     }
 
     /// What the stage came to.
     pub fn append_final(&mut self, measurements: &Measurements) -> Result<()> {
-        self.write(json!({ "final": true }), measurements)
+        self.write(&[("final", json!(true))], measurements)
     }
 
-    fn write(&mut self, head: Value, measurements: &Measurements) -> Result<()> {
-        let mut line = Map::from_iter([("stage".to_string(), json!(self.stage))]);
-        line.extend(head.as_object().cloned().into_iter().flatten());
-        line.extend(measurements.iter().map(|&(name, value)| (name.to_string(), json!(value))));
-        writeln!(self.file, "{}", Value::Object(line)).map_err(Error::io(&self.path))
+    fn write(&mut self, head: &[(&str, Value)], measurements: &Measurements) -> Result<()> {
+        let mut line = format!("{{\"stage\":\"{}\"", self.stage);
+        let measured = measurements.iter().map(|&(name, value)| (name, json!(value)));
+        for (name, value) in head.iter().cloned().chain(measured) {
+            line.push_str(&format!(",\"{name}\":{value}"));
+        }
+        writeln!(self.file, "{line}}}").map_err(Error::io(&self.path))
     }
 }
 
