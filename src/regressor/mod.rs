@@ -61,7 +61,7 @@ impl RegressorConfig {
             return Err(format!("crop_margin is {}, not within [0, 0.5)", self.crop_margin));
         }
         let coarsest = 1usize.checked_shl(self.channels.len() as u32).unwrap_or(0);
-        if coarsest == 0 || self.crop_size < coarsest || self.crop_size % coarsest != 0 {
+        if coarsest == 0 || self.crop_size < coarsest || !self.crop_size.is_multiple_of(coarsest) {
             let [size, n] = [self.crop_size, self.channels.len()];
             return Err(format!("a crop_size of {size} cannot be halved {n} times"));
         }

@@ -70,7 +70,7 @@ impl ShapePriorConfig {
             return Err("the sizes of the shape prior must be positive".into());
         }
         let doublings = self.grid_side / COARSEST_SIDE;
-        if self.grid_side % COARSEST_SIDE != 0 || !doublings.is_power_of_two() {
+        if !self.grid_side.is_multiple_of(COARSEST_SIDE) || !doublings.is_power_of_two() {
             return Err(format!("grid_side is {}, not 4, 8, 16, 32, …", self.grid_side));
         }
         Ok(())

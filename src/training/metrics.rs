@@ -83,7 +83,9 @@ mod tests {
         let mut other = MetricsFile::open(folder.path(), "other", 0).unwrap();
         append(&mut other, 99);
         let mut file = MetricsFile::open(folder.path(), "stage", 0).unwrap();
-        [1, 2, 3].map(|step| append(&mut file, step));
+        for step in 1..=3 {
+            append(&mut file, step);
+        }
         writeln!(file.file, "{{\"stage\": \"st").unwrap();
 
         MetricsFile::open(folder.path(), "stage", 2).unwrap();

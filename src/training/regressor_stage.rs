@@ -13,6 +13,7 @@ use super::{
     TrainingConfig,
     batches::{cloud_tensor, row_tensor},
     crops::{Crop, render_crops},
+    pose_errors::PoseErrors,
     seeded,
     shapes::{Shapes, Surface},
     stage::{Measurements, Stage, Terms},
@@ -117,49 +118,38 @@ impl<'a> RegressorStage<'a> {
             })
             .unzip();
         let (styles, poses) = self.forward(regressors, &values, &truths, device);
-        let targets: Vec<_> =
-            truths.iter().map(|crop| self.training.styles[crop.shape_idx].clone()).collect();
-        let pose_targets: Vec<_> = truths.iter().map(pose_target).collect();
-        let style_loss = regressors.style.loss(styles, row_tensor(&targets, device), deviations);
-        vec![("pose", regressors.pose.loss(poses, &pose_targets)), ("style", style_loss)]
+        let style_targets = self.training.styles_of(&truths, device);
+        let pose_targets: Vec<_> = truths
+            .iter()
+            .map(|crop| PoseTarget::new(&crop.crop_from_world, crop.focal_ratio))
+            .collect();
+        vec![
+            ("pose", regressors.pose.loss(poses, &pose_targets)),
+            ("style", regressors.style.loss(styles, style_targets, deviations)),
+        ]
     }
 
-    /// Errors on the held-out pictures; of two hypotheses, `best_of_two` takes the better one.
+    /// Errors on the held-out pictures.
     fn measure(&self, regressors: &Regressors) -> Measurements {
         let deviations = self.prior.generator.deviations();
-        let (mut style_loss, mut firsts, mut best_of_two) = (0.0, Vec::new(), Vec::new());
+        let (mut style_loss, mut pose_errors) = (0.0, PoseErrors::default());
         for crops in self.held_out.crops.chunks(CHUNK) {
             let values: Vec<_> = crops.iter().map(Crop::values).collect();
-            let (styles, outputs) = self.forward(regressors, &values, crops, self.device);
-            let targets: Vec<_> =
-                crops.iter().map(|crop| self.held_out.styles[crop.shape_idx].clone()).collect();
-            let targets = row_tensor(&targets, self.device);
+            let (styles, poses) = self.forward(regressors, &values, crops, self.device);
+            let targets = self.held_out.styles_of(crops, self.device);
             let loss = regressors.style.loss(styles, targets, deviations.clone());
-            style_loss += f64::from(host_values(&loss)[0]) * crops.len() as f64;
+            let share = crops.len() as f64 / self.held_out.crops.len() as f64;
+            style_loss += share * f64::from(host_values(&loss)[0]);
 
-            let [_, n_outputs] = outputs.dims();
-            for (crop, outputs) in crops.iter().zip(host_values(&outputs).chunks(n_outputs)) {
+            let [_, n_outputs] = poses.dims();
+            for (crop, outputs) in crops.iter().zip(host_values(&poses).chunks(n_outputs)) {
                 let hypotheses = regressors.pose.hypotheses(outputs, crop.focal_ratio);
-                let errors = hypotheses.iter().take(2).map(|(pose, _)| {
-                    f64::from(pose.rotation.angle_to(&crop.crop_from_world.rotation).to_degrees())
-                });
-                let errors: Vec<f64> = errors.collect();
-                best_of_two.push(errors.iter().copied().fold(f64::MAX, f64::min));
-                firsts.push(errors[0]);
+                pose_errors.push(&hypotheses, &crop.crop_from_world);
             }
         }
-        let n = firsts.len() as f64;
-        let mean = |errors: &[f64]| errors.iter().sum::<f64>() / n;
-        let flipped = firsts.iter().filter(|&&error| error > 90.0).count() as f64 / n;
-        let mean_first = mean(&firsts);
-        firsts.sort_by(f64::total_cmp);
-        vec![
-            ("mean_degrees", mean_first),
-            ("median_degrees", firsts[firsts.len() / 2]),
-            ("share_over_90_degrees", flipped),
-            ("mean_degrees_best_of_two", mean(&best_of_two)),
-            ("style_loss", style_loss / n),
-        ]
+        let mut measurements = pose_errors.measurements();
+        measurements.push(("style_loss", style_loss));
+        measurements
     }
 
     /// Eq. 7 of the clouds that the regressed styles stand for, and of what the encoder knows.
@@ -196,6 +186,14 @@ impl<'a> RegressorStage<'a> {
     }
 }
 
+impl Pictures {
+    /// The styles of what these crops show, `[b, k]`.
+    fn styles_of(&self, crops: &[Crop], device: &Device) -> Tensor<2> {
+        let styles: Vec<_> = crops.iter().map(|crop| self.styles[crop.shape_idx].clone()).collect();
+        row_tensor(&styles, device)
+    }
+}
+
 /// Styles of these surfaces.
 fn encode(prior: &ShapePrior, surfaces: &[Surface], device: &Device) -> Vec<Vec<f32>> {
     let chunks = surfaces.chunks(CHUNK).map(|chunk| {
@@ -205,8 +203,4 @@ fn encode(prior: &ShapePrior, surfaces: &[Surface], device: &Device) -> Vec<Vec<
     chunks
         .flat_map(|styles| styles.chunks(prior.n_style()).map(<[_]>::to_vec).collect::<Vec<_>>())
         .collect()
-}
-
-fn pose_target(crop: &Crop) -> PoseTarget {
-    PoseTarget::new(&crop.crop_from_world, crop.focal_ratio)
 }

@@ -2,28 +2,20 @@
 
 use std::path::Path;
 
-use burn::{
-    module::Module,
-    tensor::{Device, Tensor},
-};
+use burn::{module::Module, tensor::Device};
 use nalgebra::DMatrix;
 use rand::Rng;
-use rayon::prelude::*;
 
 use super::{
     TrainingConfig,
     batches::cloud_tensor,
+    sampled_chamfer::sampled_chamfer,
     seeded,
     shapes::{Shapes, Surface},
     stage::{Measurements, Stage, Terms},
 };
 use crate::{
-    Result,
-    chamfer::{chamfer_distance, select_points},
-    data::keyed_rng,
-    host::{host_points, host_values},
-    nearest_neighbours::NearestNeighbours,
-    shape_prior::ShapePrior,
+    Result, chamfer::chamfer_distance, data::keyed_rng, host::host_values, shape_prior::ShapePrior,
 };
 
 const NAME: &str = "prior";
@@ -165,50 +157,6 @@ impl<'a> ShapeStage<'a> {
     }
 }
 
-/// Eq. 7 on `n_queries` points of each cloud, which look among all points of the other: `[1]`.
-///
-/// An unbiased estimate of the whole for a fraction of its cost.
-fn sampled_chamfer(
-    clouds: Tensor<3>,
-    targets: &[Vec<[f32; 3]>],
-    n_queries: usize,
-    rng: &mut impl Rng,
-) -> Tensor<1> {
-    let [_, n, _] = clouds.dims();
-    let generated = host_points(&clouds);
-    let queries: Vec<_> = targets
-        .iter()
-        .map(|target| {
-            [n, target.len()].map(|n_points| -> Vec<u32> {
-                (0..n_queries).map(|_| rng.random_range(0..n_points) as u32).collect()
-            })
-        })
-        .collect();
-    // Pairs of a generated point, by index, and a target point.
-    let pairs: Vec<(Vec<u32>, Vec<[f32; 3]>)> = generated
-        .par_chunks(n)
-        .zip(targets)
-        .zip(queries)
-        .map(|((generated, target), [mut of_generated, of_target])| {
-            let nearest_target = NearestNeighbours::new(target.clone());
-            let nearest_generated = NearestNeighbours::new(generated.to_vec());
-            let mut partners: Vec<[f32; 3]> = of_generated
-                .iter()
-                .map(|&i| target[nearest_target.nearest(generated[i as usize]) as usize])
-                .collect();
-            for i in of_target {
-                of_generated.push(nearest_generated.nearest(target[i as usize]));
-                partners.push(target[i as usize]);
-            }
-            (of_generated, partners)
-        })
-        .collect();
-    let (point_idx, partners): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
-    let partners = cloud_tensor(&partners, &clouds.device());
-    // Half of the pairs are of either direction, and directions add up.
-    (select_points(clouds, &point_idx) - partners).square().sum_dim(2).mean() * 2.0
-}
-
 fn chamfer(one: &[Vec<[f32; 3]>], other: &[Vec<[f32; 3]>], device: &Device) -> f64 {
     let distance = chamfer_distance(cloud_tensor(one, device), cloud_tensor(other, device));
     f64::from(host_values(&distance)[0])
@@ -217,25 +165,4 @@ fn chamfer(one: &[Vec<[f32; 3]>], other: &[Vec<[f32; 3]>], device: &Device) -> f
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, n) = values.fold((0.0, 0), |(sum, n), value| (sum + value, n + 1));
     sum / f64::from(n.max(1))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn scattered(seed: u64, n: usize) -> Vec<[f32; 3]> {
-        let mut rng = keyed_rng(seed, [0, 0]);
-        (0..n).map(|_| rng.random()).collect()
-    }
-
-    #[test]
-    fn the_sampled_chamfer_distance_estimates_the_whole() {
-        let device = Device::flex();
-        let (one, other) = ([scattered(0, 500)], [scattered(1, 400)]);
-        let mut rng = keyed_rng(2, [0, 0]);
-        let sampled = sampled_chamfer(cloud_tensor(&one, &device), &other, 20_000, &mut rng);
-        let (sampled, whole) =
-            (f64::from(host_values(&sampled)[0]), chamfer(&one, &other, &device));
-        assert!((sampled / whole - 1.0).abs() < 0.03, "{sampled} for {whole}");
-    }
 }

@@ -1,11 +1,12 @@
 use super::*;
 use crate::{data::keyed_rng, host::host_values};
 use rand::Rng;
+use std::f32::consts::TAU;
 
 fn random_pose(i: u64) -> Isometry3<f32> {
     let mut rng = keyed_rng(7, [i, 0]);
     let mut between = |low: f32, high: f32| rng.random_range(low..high);
-    let rotation = orbit_rotation(between(0.0, 6.28), between(-0.1, 0.8), between(-0.2, 0.2));
+    let rotation = orbit_rotation(between(0.0, TAU), between(-0.1, 0.8), between(-0.2, 0.2));
     let translation = [between(-0.1, 0.1), between(-0.1, 0.1), between(1.0, 2.0)];
     Isometry3::from_parts(translation.into(), rotation)
 }
