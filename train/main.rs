@@ -2,19 +2,39 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use clap::{Parser, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use object_pba::{
     Result,
     device::Backend,
     training::{TrainingConfig, train_regressors, train_shape_prior},
 };
+use render::RenderArguments;
 
-/// Trains a shape prior and its regressors. Interrupt it whenever you like: the same command goes
-/// on from its last checkpoint.
+mod render;
+
+/// Trains a shape prior and its regressors, and renders sequences to try them on.
 #[derive(Parser)]
 #[command(version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Train the autoencoder of shapes.
+    Prior(Arguments),
+    /// Train the style and pose regressors, on a finished prior.
+    Regressors(Arguments),
+    /// Train both.
+    All(Arguments),
+    /// Render sequences with their ground truth.
+    Render(RenderArguments),
+}
+
+/// Interrupt training whenever you like: the same command goes on from its last checkpoint.
+#[derive(Args)]
 struct Arguments {
-    stage: Stage,
     /// What to train: a preset such as configs/car-small.toml.
     #[arg(long)]
     config: PathBuf,
@@ -40,18 +60,14 @@ struct Arguments {
     exclude: Vec<String>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Stage {
-    /// The autoencoder of shapes.
-    Prior,
-    /// The style and pose regressors, on a finished prior.
-    Regressors,
-    /// Both.
-    All,
-}
-
 fn main() -> ExitCode {
-    match train(&Arguments::parse()) {
+    let result = match Cli::parse().command {
+        Command::Prior(arguments) => train(&arguments, true, false),
+        Command::Regressors(arguments) => train(&arguments, false, true),
+        Command::All(arguments) => train(&arguments, true, true),
+        Command::Render(arguments) => render::render(&arguments),
+    };
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {}", error.to_string().trim_end().replace('\n', " "));
@@ -60,13 +76,13 @@ fn main() -> ExitCode {
     }
 }
 
-fn train(arguments: &Arguments) -> Result<()> {
+fn train(arguments: &Arguments, prior: bool, regressors: bool) -> Result<()> {
     let config = arguments.config()?;
     let device = arguments.device.device();
-    if arguments.stage != Stage::Regressors {
+    if prior {
         train_shape_prior(&config, &arguments.out, &device)?;
     }
-    if arguments.stage != Stage::Prior {
+    if regressors {
         train_regressors(&config, &arguments.out, &device)?;
     }
     Ok(())

@@ -16,6 +16,7 @@ fn temporary() -> TempDir {
 /// Two 4 × 3 frames with a pose each.
 fn sequence() -> Sequence {
     let frame = |shift: u32| Frame {
+        path: format!("images/frame_{shift:03}.png").into(),
         color: ColorImage::from_fn(4, 3, |x, y| Rgb([x + shift, y, 2].map(|v| v as f32 / 5.0))),
         mask: ScalarImage::from_fn(4, 3, |x, _| Luma([x as f32 / 3.0])),
     };
