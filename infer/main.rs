@@ -19,6 +19,11 @@ use object_pba::{
     device::Backend,
 };
 
+/// Large tensors come and go with every operation; the system's allocator returns each one's pages
+/// to the kernel and faults them in again, which doubles a training step.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 #[derive(Parser)]
 #[command(version, about = "Camera poses and a full point cloud from pictures of an object.")]
 struct Cli {

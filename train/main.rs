@@ -12,6 +12,11 @@ use render::RenderArguments;
 
 mod render;
 
+/// Large tensors come and go with every operation; the system's allocator returns each one's pages
+/// to the kernel and faults them in again, which doubles a training step.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Trains a shape prior and its regressors, and renders sequences to try them on.
 #[derive(Parser)]
 #[command(version)]
