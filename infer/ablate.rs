@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use burn::tensor::Device;
 use object_pba::{
     bundle_adjustment::{
-        BundleAdjustmentConfig, bundle_adjust,
+        BundleAdjustmentConfig, Solver, bundle_adjust,
         shape_model::{FreePoints, ShapeModel},
         unknowns::Unknowns,
     },
@@ -78,6 +78,12 @@ fn compare(
         .map(|start| start.with_style(host_points(&cloud).as_flattened()))
         .collect();
 
+    // Points are too many for second-order steps.
+    let mut config = config.clone();
+    if config.solver == Solver::Lm {
+        config.solver = Solver::Adam;
+    }
+    let config = &config;
     let mut free_config = config.clone();
     free_config.objective.style_weight = 0.0;
     free_config.adam.style_rate = POINT_RATE;

@@ -83,7 +83,7 @@ struct Options {
     /// Preset of this solver; overrides the config's when both are given.
     #[arg(long, value_enum)]
     solver: Option<Solver>,
-    /// TOML file with what differs from the defaults, such as configs/infer-adam.toml.
+    /// TOML file with what differs from the defaults, such as configs/infer-joint.toml.
     #[arg(long)]
     config: Option<PathBuf>,
 }

@@ -57,7 +57,7 @@ fn run(sequence: &Path, extra: &[&str]) -> Output {
 fn the_demo_writes_all_it_names() {
     let folder = TempDir::new().unwrap();
     let quick = folder.path().join("quick.toml");
-    fs::write(&quick, "blurs = [1.0, 0.0]\nn_hypotheses = 1\n[adam]\niterations = 4\n").unwrap();
+    fs::write(&quick, "blurs = [1.0, 0.0]\n[lm]\niterations = 2\n").unwrap();
     let out = folder.path().join("demo");
     let arguments = ["demo", "--out", out.to_str().unwrap(), "--config", quick.to_str().unwrap()];
     let output = pba_infer(&arguments);
@@ -74,7 +74,7 @@ fn the_demo_writes_all_it_names() {
     for key in ["iterations", "seconds", "n_points", "n_frames"] {
         assert!(metrics[key].as_f64().unwrap() > 0.0, "{key}");
     }
-    assert_eq!((&metrics["device"], &metrics["solver"]), (&"flex".into(), &"adam".into()));
+    assert_eq!((&metrics["device"], &metrics["solver"]), (&"flex".into(), &"lm".into()));
     for state in ["initial", "final"] {
         for key in [
             "reference_rotation_error_deg",
@@ -94,7 +94,11 @@ fn the_demo_writes_all_it_names() {
 fn estimated_cameras_are_a_sequence_of_the_same_convention() {
     let folder = TempDir::new().unwrap();
     let still = folder.path().join("still.toml");
-    fs::write(&still, "blurs = [0.0]\nn_hypotheses = 1\n[adam]\niterations = 1\n").unwrap();
+    fs::write(
+        &still,
+        "solver = \"adam\"\nblurs = [0.0]\nn_hypotheses = 1\n[adam]\niterations = 1\n",
+    )
+    .unwrap();
     let out = folder.path().to_str().unwrap();
     let sequence = sample();
     let arguments = ["run", sequence.path().to_str().unwrap(), "--out", out];

@@ -15,7 +15,7 @@ fn preset(name: &str) -> BundleAdjustmentConfig {
 
 #[test]
 fn inference_presets_are_those_of_their_solvers() {
-    assert_eq!(preset("infer-adam.toml"), BundleAdjustmentConfig::preset(Solver::Adam));
+    assert_eq!(preset("infer-joint.toml"), BundleAdjustmentConfig::preset(Solver::Lm));
     let paper = BundleAdjustmentConfig::preset(Solver::AlternatingLbfgs);
     assert_eq!(preset("infer-algorithm1.toml"), paper);
 }

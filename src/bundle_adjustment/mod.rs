@@ -29,11 +29,11 @@ use crate::data::sequence::Sequence;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Solver {
-    /// All unknowns together, by Adam.
-    #[default]
-    Adam,
     /// All unknowns together, by Levenberg–Marquardt.
+    #[default]
     Lm,
+    /// All unknowns together, by Adam.
+    Adam,
     /// Algorithm 1 as printed: L-BFGS on each Δp_l in parallel, then p_0, then s.
     AlternatingLbfgs,
 }
@@ -55,7 +55,7 @@ pub struct BundleAdjustmentConfig {
 impl Default for BundleAdjustmentConfig {
     fn default() -> Self {
         Self {
-            solver: Solver::Adam,
+            solver: Solver::Lm,
             blurs: vec![3.0, 1.5, 0.7, 0.0],
             n_hypotheses: 2,
             objective: ObjectiveConfig::default(),
@@ -70,8 +70,7 @@ impl BundleAdjustmentConfig {
     /// What suits a solver: ours, or the paper's.
     pub fn preset(solver: Solver) -> Self {
         match solver {
-            Solver::Adam => Self::default(),
-            Solver::Lm => Self { solver, ..Self::default() },
+            Solver::Lm | Solver::Adam => Self { solver, ..Self::default() },
             Solver::AlternatingLbfgs => Self::paper(),
         }
     }

@@ -68,7 +68,7 @@ impl Default for ObjectiveConfig {
             within_masks: true,
             target_occlusion: true,
             silhouette_weight: 10.0,
-            coverage_tolerance: 1.0,
+            coverage_tolerance: 0.5,
             containment_tolerance: 0.7,
             silhouette_of_reference: true,
             silhouette_of_hidden_points: true,
