@@ -1,0 +1,207 @@
+//! Paint and trim: five pictures that are projected onto the shape.
+//!
+//! A livery is independent of the shape: any of them fits any car.
+
+mod ends;
+mod side;
+mod top;
+mod wheel;
+
+use image::RgbImage;
+use nalgebra::Point3;
+use rand::Rng;
+
+use super::{
+    canvas::{Canvas, Color, Place},
+    profile::Profile,
+};
+
+/// Free border around a picture, in metres, so that its edges do not repeat onto the car.
+const MARGIN: f32 = 0.06;
+
+/// Middles and width of racing stripes, x, in metres.
+const STRIPES: [f32; 2] = [-0.22, 0.22];
+const STRIPE_WIDTH: f32 = 0.24;
+
+/// The directions that pictures are projected from. Both sides share a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    Side,
+    Top,
+    Front,
+    Rear,
+    Wheel,
+}
+
+impl View {
+    pub const ALL: [Self; 5] = [Self::Side, Self::Top, Self::Front, Self::Rear, Self::Wheel];
+
+    /// Where a point of the workshop frame falls on the picture; for a wheel, of its own frame.
+    fn place(self, point: Point3<f32>) -> Place {
+        match self {
+            Self::Side | Self::Wheel => [point.z, point.y],
+            Self::Top => [point.z, point.x],
+            Self::Front | Self::Rear => [point.x, point.y],
+        }
+    }
+}
+
+/// Colours, and the details of trim that all pictures agree on.
+pub struct Livery {
+    pub paint: Color,
+    /// The roof of two-tone cars, else the paint.
+    pub roof: Color,
+    pub decal: Color,
+    pub glass: Color,
+    /// Plastic: bumpers, cladding, sills.
+    pub trim: Color,
+    /// Bright strips, or black ones.
+    pub accent: Color,
+    pub rim: Color,
+    pub lamp: Color,
+    pub tail_lamp: Color,
+    pub plate: Color,
+    detail: Detail,
+}
+
+/// Lengths in metres; chances that came out, as flags.
+struct Detail {
+    cladding: bool,
+    plastic_bumpers: bool,
+    bright_window_line: bool,
+    panel_van: bool,
+    racing_stripes: bool,
+    sun_roof: bool,
+    door_band: bool,
+    light_bar: bool,
+    round_lamps: bool,
+    lamp_height: f32,
+    lamp_inset: f32,
+    grille_half_width: f32,
+    n_grille_bars: usize,
+    n_spokes: usize,
+    spoke_width: f32,
+    pillar_width: f32,
+    decals: Vec<Decal>,
+}
+
+/// A patch on the doors: its place and size as fractions of the side.
+struct Decal {
+    center: Place,
+    half_size: Place,
+    exponent: f32,
+    color: Color,
+}
+
+impl Livery {
+    pub fn random(rng: &mut impl Rng) -> Self {
+        let paint = random_paint(rng);
+        let bright = rng.random_range(0.55..0.9);
+        Self {
+            paint,
+            roof: if rng.random_bool(0.2) { random_paint(rng) } else { paint },
+            decal: random_paint(rng),
+            glass: [0.10, 0.12, 0.15].map(|value: f32| value * rng.random_range(0.6..1.8)),
+            trim: [rng.random_range(0.06..0.25); 3],
+            accent: [if rng.random_bool(0.6) { bright } else { 0.08 }; 3],
+            rim: [rng.random_range(0.35..0.85); 3],
+            lamp: [0.95, 0.95, rng.random_range(0.80..0.95)],
+            tail_lamp: [rng.random_range(0.55..0.85), 0.05, 0.05],
+            plate: if rng.random_bool(0.3) { [0.95, 0.80, 0.2] } else { [0.92; 3] },
+            detail: Detail::random(rng),
+        }
+    }
+
+    /// Paints every picture, in the order of [`View::ALL`].
+    pub fn pictures(&self, profile: &Profile, rng: &mut impl Rng) -> Pictures {
+        let mut pictures = View::ALL.map(|view| match view {
+            View::Side => self.side(profile),
+            View::Top => self.top(profile),
+            View::Front => self.front(profile),
+            View::Rear => self.rear(profile),
+            View::Wheel => self.wheel(profile),
+        });
+        // Dust, wear and the uneven sheen of paint, at two sizes.
+        let wear = rng.random_range(0.02..0.08);
+        for picture in &mut pictures {
+            picture.grain(0.30, wear, rng);
+            picture.grain(0.06, 0.5 * wear, rng);
+        }
+        Pictures(pictures)
+    }
+}
+
+/// The pictures of one car, in the order of [`View::ALL`].
+pub struct Pictures([Canvas; 5]);
+
+impl Pictures {
+    /// Texture coordinates of a point that is painted from `view`.
+    pub fn uv(&self, view: View, point: Point3<f32>) -> [f32; 2] {
+        self.0[view as usize].uv(view.place(point))
+    }
+
+    pub fn to_images(&self) -> Vec<RgbImage> {
+        self.0.iter().map(Canvas::to_image).collect()
+    }
+}
+
+impl Detail {
+    fn random(rng: &mut impl Rng) -> Self {
+        let decorated = rng.random_bool(0.35);
+        let n_decals = if decorated { rng.random_range(1..6) } else { 0 };
+        Self {
+            cladding: rng.random_bool(0.35),
+            plastic_bumpers: rng.random_bool(0.35),
+            bright_window_line: rng.random_bool(0.5),
+            panel_van: rng.random_bool(0.45),
+            racing_stripes: rng.random_bool(0.15),
+            sun_roof: rng.random_bool(0.3),
+            door_band: rng.random_bool(0.25),
+            light_bar: rng.random_bool(0.3),
+            round_lamps: rng.random_bool(0.25),
+            lamp_height: rng.random_range(0.05..0.10),
+            lamp_inset: rng.random_range(0.50..0.66),
+            grille_half_width: rng.random_range(0.25..0.48),
+            n_grille_bars: rng.random_range(2..7),
+            n_spokes: rng.random_range(5..13),
+            spoke_width: rng.random_range(0.35..0.65),
+            pillar_width: rng.random_range(0.05..0.10),
+            decals: (0..n_decals).map(|_| Decal::random(rng)).collect(),
+        }
+    }
+}
+
+impl Decal {
+    fn random(rng: &mut impl Rng) -> Self {
+        Self {
+            center: [rng.random_range(0.25..0.9), rng.random_range(0.25..0.9)],
+            half_size: [rng.random_range(0.02..0.10), rng.random_range(0.05..0.2)],
+            exponent: rng.random_range(1.2..8.0),
+            color: random_paint(rng),
+        }
+    }
+}
+
+/// White, silver, grey and black as often as on the road; otherwise any hue.
+fn random_paint(rng: &mut impl Rng) -> Color {
+    if rng.random_bool(0.35) {
+        let value = rng.random_range(0.08..0.92);
+        return [value, value, value * rng.random_range(0.95..1.05)];
+    }
+    let (hue, saturation) = (rng.random_range(0.0..6.0), rng.random_range(0.35..0.95));
+    let value = rng.random_range(0.30..0.92);
+    // A hue is a triangle wave on each channel, a third of a turn apart.
+    [0.0_f32, 2.0, 4.0].map(|peak| {
+        let distance = (hue - peak).abs().min(6.0 - (hue - peak).abs());
+        value * (1.0 - saturation * (distance - 1.0).clamp(0.0, 1.0))
+    })
+}
+
+fn darker(color: Color, factor: f32) -> Color {
+    color.map(|value| value * factor)
+}
+
+/// Evenly spaced values from `start` to `end`, both included.
+fn steps(start: f32, end: f32, n: usize) -> impl DoubleEndedIterator<Item = f32> + Clone {
+    (0..=n).map(move |step| start + (end - start) * step as f32 / n as f32)
+}
