@@ -8,6 +8,7 @@ pub mod obj;
 pub mod shapenet;
 pub mod surface;
 pub mod procedural;
+pub mod texture;
 pub mod lighting;
 pub mod rasteriser;
 pub mod viewpoint;
