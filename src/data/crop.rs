@@ -160,6 +160,7 @@ mod tests {
         viewpoint::projected_box,
     };
     use nalgebra::Translation3;
+    use std::f32::consts::{PI, TAU};
 
     const SOURCE: Intrinsics = Intrinsics { focal: [520.0, 540.0], center: [310.0, 215.0] };
     const SIZE: [usize; 2] = [600, 450];
@@ -168,7 +169,7 @@ mod tests {
     fn ball() -> Mesh {
         const N: u32 = 24;
         let vertex = |i: u32, j: u32| {
-            let [a, b] = [i as f32 / N as f32 * 6.2832, j as f32 / N as f32 * 3.1416];
+            let [a, b] = [i as f32 / N as f32 * TAU, j as f32 / N as f32 * PI];
             let radius = 0.35 + 0.05 * (3.0 * a).sin() * b.sin();
             Point3::new(a.cos() * b.sin(), b.cos(), a.sin() * b.sin()) * radius
         };

@@ -104,8 +104,8 @@ impl Light {
             Place::Point(position) => {
                 let towards = position - point;
                 let squared = towards.norm_squared().max(f32::MIN_POSITIVE);
-                let fall_off = position.coords.norm_squared() / squared;
-                normal.dot(&towards).max(0.0) * fall_off / squared.sqrt()
+                let facing = normal.dot(&towards).max(0.0);
+                facing * position.coords.norm_squared() / (squared * squared.sqrt())
             }
         }
     }

@@ -30,18 +30,20 @@ impl Texture {
     /// little too soft at a grazing angle than sparkling.
     pub fn sample(&self, uv: [f32; 2], uv_per_pixel: [[f32; 2]; 2]) -> [f32; 3] {
         let [width, height] = [self.levels[0].width() as f32, self.levels[0].height() as f32];
-        let [along_x, along_y] = uv_per_pixel.map(|[u, v]| (u * width).hypot(v * height));
+        let [along_x, along_y] =
+            uv_per_pixel.map(|[u, v]| (u * width).powi(2) + (v * height).powi(2));
         let coarsest = (self.levels.len() - 1) as f32;
-        // max() before clamp() also turns a NaN, from a degenerate uv map, into the finest level.
-        let level = along_x.max(along_y).max(1.0).log2().clamp(0.0, coarsest);
+        // log₂ of a length is half that of its square. A NaN, from a degenerate uv map, becomes 0.
+        let level = (along_x.max(along_y).max(1.0).log2() / 2.0).min(coarsest);
 
-        let [fine, blend] = [level.floor(), level.fract()];
-        let color = bilinear(&self.levels[fine as usize], uv);
+        let fine = level as usize;
+        let blend = level - fine as f32;
+        let color = bilinear(&self.levels[fine], uv);
         if blend == 0.0 {
             return color;
         }
-        let coarse = bilinear(&self.levels[fine as usize + 1], uv);
-        std::array::from_fn(|c| color[c] + blend * (coarse[c] - color[c]))
+        let coarse = bilinear(&self.levels[fine + 1], uv);
+        mix(color, coarse, blend)
     }
 }
 
@@ -59,26 +61,35 @@ fn halve(image: &RgbImage) -> RgbImage {
 
 /// RGB in [0, 1] between the four nearest texel centres, wrapping around at the borders.
 fn bilinear(image: &RgbImage, [u, v]: [f32; 2]) -> [f32; 3] {
-    let [x0, x1, right] = neighbours(u, image.width());
-    let [y0, y1, down] = neighbours(1.0 - v, image.height());
-    let texel = |x: f32, y: f32| image.get_pixel(x as u32, y as u32).0;
-    let corners = [texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1)];
-    let weights =
-        [(1. - right) * (1. - down), right * (1. - down), (1. - right) * down, right * down];
-    std::array::from_fn(|c| {
-        (0..4).map(|k| weights[k] * f32::from(corners[k][c])).sum::<f32>() / 255.0
-    })
+    let ([left, right], across) = neighbours(u, image.width());
+    let ([above, below], down) = neighbours(1.0 - v, image.height());
+    let texel = |x: u32, y: u32| {
+        let first = 3 * (y as usize * image.width() as usize + x as usize);
+        [0, 1, 2].map(|c| f32::from(image.as_raw()[first + c]))
+    };
+    let top = mix(texel(left, above), texel(right, above), across);
+    let bottom = mix(texel(left, below), texel(right, below), across);
+    mix(top, bottom, down).map(|value| value / 255.0)
 }
 
 /// The texels before and after `coordinate` on an axis of `size` texels, and the second's weight.
-fn neighbours(coordinate: f32, size: u32) -> [f32; 3] {
+fn neighbours(coordinate: f32, size: u32) -> ([u32; 2], f32) {
     // The fractional part first: it keeps its precision however often the texture has repeated.
-    let position = (coordinate - coordinate.floor()) * size as f32 - 0.5;
-    let before = position.floor();
-    let last = size as f32 - 1.0;
-    let first = if before < 0.0 { last } else { before.min(last) };
-    let second = if before + 1.0 > last { 0.0 } else { before + 1.0 };
-    [first, second, position - before]
+    // Casts instead of floor(): baseline x86-64 has no instruction for it.
+    let mut fraction = coordinate - coordinate as i32 as f32;
+    if fraction < 0.0 {
+        fraction += 1.0;
+    }
+    // From the last texel's centre, one repeat before, so that the position is positive.
+    let position = fraction * size as f32 + (size as f32 - 0.5);
+    let before = position as u32;
+    let wrapped = |texel: u32| if texel >= size { texel - size } else { texel };
+    let first = wrapped(before).min(size - 1);
+    ([first, wrapped(first + 1)], position - before as f32)
+}
+
+fn mix(from: [f32; 3], to: [f32; 3], share: f32) -> [f32; 3] {
+    std::array::from_fn(|c| from[c] + share * (to[c] - from[c]))
 }
 
 #[cfg(test)]

@@ -175,8 +175,8 @@ fn framed(
     pose
 }
 
-/// Uniform between the two, which may be equal.
-fn between([from, to]: [f32; 2], rng: &mut impl Rng) -> f32 {
+/// A number between the two, which may be equal.
+pub fn between([from, to]: [f32; 2], rng: &mut impl Rng) -> f32 {
     from + (to - from) * rng.random::<f32>()
 }
 

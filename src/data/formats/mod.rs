@@ -1,1 +1,40 @@
-//! (to come)
+//! Files that other programs read and write too.
+
+pub mod axes;
+pub mod nerfstudio;
+pub mod ply;
+
+use std::{fs, path::Path, process};
+
+use crate::{Error, Result};
+
+/// Writes a file in one step: readers see the old one or the new one, never half of it.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(format!(".{}.partial", process::id()));
+    let partial = path.with_file_name(name);
+    let written = fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path));
+    written.map_err(|error| {
+        // The first error is the one to report; there may be nothing to clean up.
+        let _ = fs::remove_file(&partial);
+        Error::io(path)(error)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_and_nothing_is_left_behind() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("file");
+        for text in ["old", "new"] {
+            write_atomically(&path, text.as_bytes()).expect("it is writable");
+            assert_eq!(fs::read_to_string(&path).expect("it is there"), text);
+        }
+        assert_eq!(fs::read_dir(folder.path()).expect("it is there").count(), 1);
+        let error = write_atomically(&folder.path().join("no/such"), b"").unwrap_err();
+        assert!(error.to_string().contains("no/such"), "{error}");
+    }
+}

@@ -1,11 +1,11 @@
 //! The rasteriser against a ray caster that shares nothing with it (Möller and Trumbore, 1997).
 
-use image::RgbImage;
+use image::{Luma, Rgb, RgbImage};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::Rng;
 
 use super::*;
-use crate::data::{keyed_rng, mesh::Triangle};
+use crate::data::{keyed_rng, lighting::Ground, viewpoint::look_at};
 
 const SIZE: [usize; 2] = [64, 48];
 const CAMERA: Intrinsics = Intrinsics { focal: [70.0, 75.0], center: [30.0, 25.0] };
@@ -152,11 +152,36 @@ fn texture_coordinates_are_perspective_correct() {
 }
 
 #[test]
+fn a_surface_point_has_one_colour_from_every_side() {
+    let mut mesh = random_mesh(6, 1);
+    mesh.textures = vec![RgbImage::from_fn(64, 64, |x, y| Rgb([4 * x as u8, 4 * y as u8, 90]))];
+    mesh.triangles[0].texture = Some(0);
+    let corners: Vec<_> = mesh.vertices.iter().map(|vertex| vertex.coords).collect();
+    let target = Point3::from((corners[0] + corners[1] + corners[2]) / 3.0);
+    let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).normalize();
+    let tangent = (corners[1] - corners[0]).normalize();
+
+    let scene = Scene::random(&mut keyed_rng(6, [0, 1]), None);
+    // The pixel grid is such that the optical axis meets the middle of a pixel.
+    let camera = Intrinsics { focal: [90.0; 2], center: [16.5; 2] };
+    let color_from = |eye: Point3<f32>| {
+        let pose = look_at(eye, target);
+        render(&mesh, &scene, &pose, &camera, [33, 33]).color.get_pixel(16, 16).0
+    };
+    let head_on = color_from(target + normal);
+    for slant in [-0.8, 0.5, 1.0] {
+        let slanted = color_from(target + normal * 1.3 + tangent * slant);
+        let difference = head_on.iter().zip(slanted).map(|(a, b)| (a - b).abs());
+        assert!(difference.fold(0.0, f32::max) < 4e-3, "{head_on:?} and {slanted:?}");
+    }
+}
+
+#[test]
 fn the_carpet_begins_below_the_horizon() {
     let mut rng = keyed_rng(4, [0, 0]);
     let scene = Scene {
         background: [0.0, 0.0, 1.0],
-        ground: Some(crate::data::lighting::Ground::random(&mut rng, -0.2)),
+        ground: Some(Ground::random(&mut rng, -0.2)),
         ..flat_light()
     };
     // The world's y points up and the camera's down, so a level camera is turned about z.

@@ -1,0 +1,204 @@
+//! Point clouds as PLY, which every mesh viewer opens.
+
+use std::{
+    fs::File,
+    io::{BufReader, Cursor},
+    path::Path,
+};
+
+use nalgebra::Point3;
+use ply_rs_bw::{
+    parser::Parser,
+    ply::{
+        ElementDef, Encoding, Ply, PropertyAccess, PropertyAccessResult, PropertyDef, PropertyType,
+        ScalarType,
+    },
+    writer::Writer,
+};
+
+use super::write_atomically;
+use crate::{Error, Result};
+
+/// What to write of a cloud. Where present, `colors` and `visible` hold one entry a point; points
+/// beyond their end are written black and hidden.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PointCloud {
+    pub points: Vec<Point3<f32>>,
+    pub colors: Option<Vec<[u8; 3]>>,
+    /// Whether the reference frame sees the point.
+    pub visible: Option<Vec<bool>>,
+}
+
+/// Reads the vertices of a PLY file, ASCII or binary; other elements and properties are left out.
+pub fn read_points(path: &Path) -> Result<Vec<Point3<f32>>> {
+    let unusable = |reason: String| Error::Points { path: path.into(), reason };
+    let mut reader = BufReader::new(File::open(path).map_err(Error::io(path))?);
+    let mut ply = Parser::<Vertex>::new()
+        .read_ply(&mut reader)
+        .map_err(|error| unusable(error.to_string()))?;
+    let vertices = ply.payload.shift_remove("vertex").unwrap_or_default();
+    if vertices.is_empty() {
+        return Err(unusable("it has no vertices".into()));
+    }
+    let points: Vec<_> = vertices.into_iter().map(|vertex| vertex.position).collect();
+    match points.iter().position(|point| point.iter().any(|value| !value.is_finite())) {
+        Some(idx) => Err(unusable(format!("vertex {idx} has no finite x, y and z"))),
+        None => Ok(points),
+    }
+}
+
+/// Writes binary PLY: x, y, z, then red, green, blue and visible (0 or 1) where known.
+pub fn write_points(path: &Path, cloud: &PointCloud) -> Result<()> {
+    let mut element = ElementDef::new("vertex".into());
+    let mut declare = |names: &[&str], scalar: ScalarType| {
+        for name in names {
+            let property = PropertyDef::new((*name).into(), PropertyType::Scalar(scalar.clone()));
+            element.properties.insert((*name).into(), property);
+        }
+    };
+    declare(&["x", "y", "z"], ScalarType::Float);
+    if cloud.colors.is_some() {
+        declare(&["red", "green", "blue"], ScalarType::UChar);
+    }
+    if cloud.visible.is_some() {
+        declare(&["visible"], ScalarType::UChar);
+    }
+
+    let vertices = cloud.points.iter().enumerate().map(|(idx, point)| Vertex {
+        position: *point,
+        color: cloud.colors.as_ref().and_then(|all| all.get(idx).copied()).unwrap_or_default(),
+        visible: cloud.visible.as_ref().and_then(|all| all.get(idx).copied()).unwrap_or_default(),
+    });
+    let mut ply = Ply::<Vertex>::new();
+    ply.header.encoding = Encoding::BinaryLittleEndian;
+    ply.header.elements.insert("vertex".into(), element);
+    ply.payload.insert("vertex".into(), vertices.collect());
+
+    let mut bytes = Cursor::new(vec![]);
+    Writer::new().write_ply(&mut bytes, &mut ply).map_err(Error::io(path))?;
+    write_atomically(path, bytes.get_ref())
+}
+
+/// One vertex of a file; coordinates that the file leaves out stay NaN.
+struct Vertex {
+    position: Point3<f32>,
+    color: [u8; 3],
+    visible: bool,
+}
+
+impl Vertex {
+    fn set(&mut self, name: &str, value: f32) -> PropertyAccessResult {
+        let Some(axis) = ["x", "y", "z"].iter().position(|axis| *axis == name) else {
+            return PropertyAccessResult::Ignored;
+        };
+        self.position[axis] = value;
+        PropertyAccessResult::Set
+    }
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self { position: Point3::from([f32::NAN; 3]), color: [0; 3], visible: false }
+    }
+
+    fn set_float(&mut self, name: &str, value: f32) -> PropertyAccessResult {
+        self.set(name, value)
+    }
+
+    fn set_double(&mut self, name: &str, value: f64) -> PropertyAccessResult {
+        self.set(name, value as f32)
+    }
+
+    fn get_float(&self, name: &str) -> Option<f32> {
+        ["x", "y", "z"].iter().position(|axis| *axis == name).map(|axis| self.position[axis])
+    }
+
+    fn get_uchar(&self, name: &str) -> Option<u8> {
+        match name {
+            "red" => Some(self.color[0]),
+            "green" => Some(self.color[1]),
+            "blue" => Some(self.color[2]),
+            "visible" => Some(self.visible.into()),
+            _ => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn cloud() -> PointCloud {
+        PointCloud {
+            points: vec![Point3::new(0.5, -1.25, 3.0), Point3::new(1e-7, 0.0, -2.0)],
+            colors: Some(vec![[255, 0, 7], [1, 2, 3]]),
+            visible: Some(vec![true, false]),
+        }
+    }
+
+    #[test]
+    fn points_round_trip() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("points.ply");
+        let bare = PointCloud { colors: None, visible: None, ..cloud() };
+        for cloud in [cloud(), bare] {
+            write_points(&path, &cloud).expect("it is writable");
+            assert_eq!(read_points(&path).expect("it is a cloud"), cloud.points);
+        }
+    }
+
+    #[test]
+    fn the_bytes_are_those_of_the_format() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("points.ply");
+        write_points(&path, &cloud()).expect("it is writable");
+        let bytes = fs::read(&path).expect("it is there");
+        let end = b"end_header\n";
+        let header = bytes.windows(end.len()).position(|window| window == end).expect("a header");
+        let body = &bytes[header + end.len()..];
+        assert_eq!(body.len(), 2 * 16);
+        assert_eq!(body[..4], 0.5_f32.to_le_bytes());
+        assert_eq!(body[12..16], [255, 0, 7, 1]);
+        let header = String::from_utf8_lossy(&bytes[..header]);
+        assert!(header.contains("format binary_little_endian 1.0"), "{header}");
+        assert!(header.contains("element vertex 2"), "{header}");
+        assert!(header.contains("property uchar visible"), "{header}");
+    }
+
+    #[test]
+    fn ascii_files_with_faces_and_doubles_are_read() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("mesh.ply");
+        let text = "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty float y\n\
+            property double z\nproperty int label\nelement face 1\n\
+            property list uchar int vertex_indices\nend_header\n1 2 3 9\n3 0 0 0\n";
+        fs::write(&path, text).expect("it is writable");
+        assert_eq!(read_points(&path).expect("it is a cloud"), [Point3::new(1.0, 2.0, 3.0)]);
+    }
+
+    #[test]
+    fn broken_files_are_refused_by_name() {
+        let header =
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n";
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("broken.ply");
+        let broken = [
+            String::new(),
+            "not a ply".into(),
+            format!("{header}end_header\n1 2\n"),
+            format!("{header}property float z\nend_header\n1 2 nan\n"),
+            format!("{header}property float z\nend_header\n1 2\n"),
+            "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n".into(),
+            "ply\nformat binary_little_endian 1.0\nelement vertex 99999999999\n\
+             property float x\nend_header\n"
+                .into(),
+        ];
+        for text in broken {
+            fs::write(&path, &text).expect("it is writable");
+            let error = read_points(&path).unwrap_err().to_string();
+            assert!(error.contains("broken.ply"), "{error}");
+        }
+        assert!(matches!(read_points(&folder.path().join("missing.ply")), Err(Error::Io { .. })));
+    }
+}
