@@ -47,7 +47,7 @@ pub fn body(profile: &Profile) -> Solid {
 
 /// Whether a column of [`body`] belongs to the floor or to a wheel arch.
 pub fn is_underside(column: usize) -> bool {
-    column < N_UNDER || column >= 2 * N_HALF - N_UNDER
+    !(N_UNDER..2 * N_HALF - N_UNDER).contains(&column)
 }
 
 /// Whether a column of [`body`] belongs to the roof, the bonnet, the deck or the bed.

@@ -10,10 +10,12 @@
 
 mod body;
 mod canvas;
+mod curve;
 mod fittings;
 mod livery;
 mod parameters;
 mod profile;
+mod random;
 mod solid;
 
 use nalgebra::{Point3, Vector3};

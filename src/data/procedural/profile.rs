@@ -3,7 +3,10 @@
 //! In the workshop frame: metres, x to the car's right, y up from the ground, z backwards from the
 //! middle of the car.
 
-use super::parameters::CarParameters;
+use super::{
+    curve::{sample_polyline, smooth},
+    parameters::CarParameters,
+};
 
 /// Samples of the roof line.
 const N_SAMPLES: usize = 1001;
@@ -72,7 +75,10 @@ impl Profile {
             nose_height,
             bonnet_height,
             deck_height,
-            roof_line: smooth(&sample_polyline(&corners), hull.softness * N_SAMPLES as f32),
+            roof_line: smooth(
+                &sample_polyline(&corners, N_SAMPLES),
+                hull.softness * N_SAMPLES as f32,
+            ),
         }
     }
 
@@ -148,7 +154,7 @@ impl Profile {
     /// The load bed of a pickup, z, if there is one.
     pub fn bed(&self) -> Option<[f32; 2]> {
         let deep = self.parameters.fittings.bed_depth > 0.0;
-        deep.then(|| [self.deck_start + 0.07, self.rear - 0.09])
+        deep.then_some([self.deck_start + 0.07, self.rear - 0.09])
     }
 
     fn fraction(&self, z: f32) -> f32 {
@@ -173,31 +179,4 @@ pub struct Cant {
 
 fn ramp(x: f32) -> f32 {
     x.clamp(0.0, 1.0)
-}
-
-/// Heights at `N_SAMPLES` even steps of [0, 1] along corners `[position, height]`.
-fn sample_polyline(corners: &[[f32; 2]]) -> Vec<f32> {
-    (0..N_SAMPLES)
-        .map(|sample| {
-            let position = sample as f32 / (N_SAMPLES - 1) as f32;
-            let end = corners.partition_point(|c| c[0] < position).clamp(1, corners.len() - 1);
-            let ([x0, y0], [x1, y1]) = (corners[end - 1], corners[end]);
-            y0 + (y1 - y0) * ((position - x0) / (x1 - x0)).clamp(0.0, 1.0)
-        })
-        .collect()
-}
-
-/// Gaussian smoothing with `sigma` in samples; the ends continue as they are.
-fn smooth(samples: &[f32], sigma: f32) -> Vec<f32> {
-    let reach = (3.0 * sigma).ceil() as i64;
-    let kernel: Vec<f32> =
-        (-reach..=reach).map(|offset| (-0.5 * (offset as f32 / sigma).powi(2)).exp()).collect();
-    let total: f32 = kernel.iter().sum();
-    let last = samples.len() as i64 - 1;
-    (0..=last)
-        .map(|idx| {
-            let window = (idx - reach..=idx + reach).map(|i| samples[i.clamp(0, last) as usize]);
-            window.zip(&kernel).map(|(sample, weight)| sample * weight).sum::<f32>() / total
-        })
-        .collect()
 }

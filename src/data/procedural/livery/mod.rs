@@ -2,6 +2,7 @@
 //!
 //! A livery is independent of the shape: any of them fits any car.
 
+mod detail;
 mod ends;
 mod side;
 mod top;
@@ -11,6 +12,7 @@ use image::RgbImage;
 use nalgebra::Point3;
 use rand::Rng;
 
+use self::detail::Detail;
 use super::{
     canvas::{Canvas, Color, Place},
     profile::Profile,
@@ -64,35 +66,6 @@ pub struct Livery {
     detail: Detail,
 }
 
-/// Lengths in metres; chances that came out, as flags.
-struct Detail {
-    cladding: bool,
-    plastic_bumpers: bool,
-    bright_window_line: bool,
-    panel_van: bool,
-    racing_stripes: bool,
-    sun_roof: bool,
-    door_band: bool,
-    light_bar: bool,
-    round_lamps: bool,
-    lamp_height: f32,
-    lamp_inset: f32,
-    grille_half_width: f32,
-    n_grille_bars: usize,
-    n_spokes: usize,
-    spoke_width: f32,
-    pillar_width: f32,
-    decals: Vec<Decal>,
-}
-
-/// A patch on the doors: its place and size as fractions of the side.
-struct Decal {
-    center: Place,
-    half_size: Place,
-    exponent: f32,
-    color: Color,
-}
-
 impl Livery {
     pub fn random(rng: &mut impl Rng) -> Self {
         let paint = random_paint(rng);
@@ -101,7 +74,7 @@ impl Livery {
             paint,
             roof: if rng.random_bool(0.2) { random_paint(rng) } else { paint },
             decal: random_paint(rng),
-            glass: [0.10, 0.12, 0.15].map(|value: f32| value * rng.random_range(0.6..1.8)),
+            glass: darker([0.10, 0.12, 0.15], rng.random_range(0.6..1.8)),
             trim: [rng.random_range(0.06..0.25); 3],
             accent: [if rng.random_bool(0.6) { bright } else { 0.08 }; 3],
             rim: [rng.random_range(0.35..0.85); 3],
@@ -145,43 +118,6 @@ impl Pictures {
     }
 }
 
-impl Detail {
-    fn random(rng: &mut impl Rng) -> Self {
-        let decorated = rng.random_bool(0.35);
-        let n_decals = if decorated { rng.random_range(1..6) } else { 0 };
-        Self {
-            cladding: rng.random_bool(0.35),
-            plastic_bumpers: rng.random_bool(0.35),
-            bright_window_line: rng.random_bool(0.5),
-            panel_van: rng.random_bool(0.45),
-            racing_stripes: rng.random_bool(0.15),
-            sun_roof: rng.random_bool(0.3),
-            door_band: rng.random_bool(0.25),
-            light_bar: rng.random_bool(0.3),
-            round_lamps: rng.random_bool(0.25),
-            lamp_height: rng.random_range(0.05..0.10),
-            lamp_inset: rng.random_range(0.50..0.66),
-            grille_half_width: rng.random_range(0.25..0.48),
-            n_grille_bars: rng.random_range(2..7),
-            n_spokes: rng.random_range(5..13),
-            spoke_width: rng.random_range(0.35..0.65),
-            pillar_width: rng.random_range(0.05..0.10),
-            decals: (0..n_decals).map(|_| Decal::random(rng)).collect(),
-        }
-    }
-}
-
-impl Decal {
-    fn random(rng: &mut impl Rng) -> Self {
-        Self {
-            center: [rng.random_range(0.25..0.9), rng.random_range(0.25..0.9)],
-            half_size: [rng.random_range(0.02..0.10), rng.random_range(0.05..0.2)],
-            exponent: rng.random_range(1.2..8.0),
-            color: random_paint(rng),
-        }
-    }
-}
-
 /// White, silver, grey and black as often as on the road; otherwise any hue.
 fn random_paint(rng: &mut impl Rng) -> Color {
     if rng.random_bool(0.35) {
@@ -197,6 +133,7 @@ fn random_paint(rng: &mut impl Rng) -> Color {
     })
 }
 
+/// Scales a colour.
 fn darker(color: Color, factor: f32) -> Color {
     color.map(|value| value * factor)
 }

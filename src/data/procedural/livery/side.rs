@@ -132,7 +132,8 @@ impl Livery {
             let (low, high) = (profile.belt(z) - 0.02, profile.top(z) - ROOF_FRAME);
             canvas.trace(&[[z, low], [z + 0.04, high]], width, color);
         };
-        for &end in &doors.ends {
+        let glass_end = band.iter().map(|place| place[0]).fold(f32::NEG_INFINITY, f32::max);
+        for &end in doors.ends.iter().filter(|&&end| end < glass_end - 0.15) {
             pillar(canvas, end, self.detail.pillar_width, [0.06; 3]);
         }
         let quarter_light = doors.start + 0.28;
