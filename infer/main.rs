@@ -1,1 +1,130 @@
-fn main() {}
+//! pba-infer: reconstruct sequences, judge them, and ablate the prior.
+
+mod ablate;
+mod assets;
+mod evaluate;
+mod figures;
+mod output;
+mod run;
+
+use std::{path::PathBuf, process::ExitCode};
+
+use anyhow::{Context, Result};
+use burn::tensor::Device;
+use clap::{Args, Parser, Subcommand};
+use object_pba::{
+    bundle_adjustment::{BundleAdjustmentConfig, Solver},
+    checkpoint::Prior,
+    config::read_config,
+    device::Backend,
+};
+
+#[derive(Parser)]
+#[command(version, about = "Camera poses and a full point cloud from pictures of an object.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Reconstruct the bundled sequence with the bundled prior.
+    Demo {
+        /// Folder for the pictures, the cloud and the cameras.
+        #[arg(long, default_value = "runs/demo")]
+        out: PathBuf,
+        #[command(flatten)]
+        options: Options,
+    },
+    /// Reconstruct a sequence: a folder with a transforms.json, frames and masks.
+    Run {
+        sequence: PathBuf,
+        /// Folder for the results.
+        #[arg(long)]
+        out: PathBuf,
+        #[command(flatten)]
+        options: Options,
+    },
+    /// Reconstruct every sequence below a folder and tabulate errors before and after.
+    Evaluate {
+        dataset: PathBuf,
+        /// Folder for the tables.
+        #[arg(long)]
+        out: PathBuf,
+        #[command(flatten)]
+        options: Options,
+    },
+    /// Compare the shape prior with points that move freely (Fig. 7).
+    Ablate {
+        #[arg(required = true)]
+        sequences: Vec<PathBuf>,
+        /// Folder for the table and the pictures.
+        #[arg(long, default_value = "runs/ablate")]
+        out: PathBuf,
+        #[command(flatten)]
+        options: Options,
+    },
+}
+
+/// What every command understands.
+#[derive(Args)]
+struct Options {
+    /// Folder of a trained prior; the bundled car prior when left out.
+    #[arg(long)]
+    prior: Option<PathBuf>,
+    /// Backend to compute on.
+    #[arg(long, value_enum, default_value_t)]
+    device: Backend,
+    /// Preset of this solver; overrides the config's when both are given.
+    #[arg(long, value_enum)]
+    solver: Option<Solver>,
+    /// TOML file with what differs from the defaults, such as configs/infer-adam.toml.
+    #[arg(long)]
+    config: Option<PathBuf>,
+}
+
+impl Options {
+    fn load_prior(&self, device: &Device) -> Result<Prior> {
+        match &self.prior {
+            Some(folder) => Prior::load(folder, device)
+                .with_context(|| format!("cannot load the prior in {}", folder.display())),
+            None => assets::car_prior(device).context("cannot load the bundled prior"),
+        }
+    }
+
+    fn bundle_adjustment(&self) -> Result<BundleAdjustmentConfig> {
+        let mut config = match &self.config {
+            Some(path) => read_config(path)?,
+            None => BundleAdjustmentConfig::preset(self.solver.unwrap_or_default()),
+        };
+        config.solver = self.solver.unwrap_or(config.solver);
+        Ok(config)
+    }
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Demo { out, options } => run::demo(&out, &options),
+        Command::Run { sequence, out, options } => run::run(&sequence, &out, &options),
+        Command::Evaluate { dataset, out, options } => evaluate::evaluate(&dataset, &out, &options),
+        Command::Ablate { sequences, out, options } => ablate::ablate(&sequences, &out, &options),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", one_line(&error));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The chain of causes, each said once.
+fn one_line(error: &anyhow::Error) -> String {
+    let mut causes: Vec<String> = Vec::new();
+    for cause in error.chain().map(|cause| cause.to_string().replace('\n', " ")) {
+        if !causes.last().is_some_and(|last| last.ends_with(&cause)) {
+            causes.push(cause);
+        }
+    }
+    causes.join(": ")
+}

@@ -15,6 +15,7 @@ pub mod chamfer;
 pub mod loss;
 pub mod bundle_adjustment;
 pub mod metrics;
+pub mod reconstruction;
 pub mod training;
 pub mod data;
 

@@ -59,6 +59,23 @@ impl Default for BundleAdjustmentConfig {
 }
 
 impl BundleAdjustmentConfig {
+    /// What suits a solver: ours, or the paper's.
+    pub fn preset(solver: Solver) -> Self {
+        match solver {
+            Solver::Adam => Self::default(),
+            Solver::AlternatingLbfgs => Self::paper(),
+        }
+    }
+
+    /// Steps that a whole run reports at most, for progress bars.
+    pub fn n_reports(&self) -> usize {
+        let per_level = match self.solver {
+            Solver::Adam => self.adam.iterations + 1,
+            Solver::AlternatingLbfgs => 3 * self.alternating.max_rounds + 1,
+        };
+        per_level * (self.n_hypotheses.max(1) + self.blurs.len() - 1)
+    }
+
     /// Algorithm 1 on Eq. 6, as the paper prints them.
     pub fn paper() -> Self {
         Self {

@@ -72,6 +72,14 @@ impl Unknowns {
         unknowns
     }
 
+    /// The same poses, and another style.
+    pub fn with_style(&self, style: &[f32]) -> Self {
+        let mut unknowns = self.clone();
+        unknowns.values.truncate(6 * self.n_frames);
+        unknowns.values.extend(style.iter().map(|&s| f64::from(s)));
+        unknowns
+    }
+
     /// Where p_0 lies in `values`.
     pub const REFERENCE: Range<usize> = 0..6;
 
@@ -130,10 +138,6 @@ impl Unknowns {
     /// The pose of every frame on the host.
     pub fn camera_from_world(&self, device: &Device) -> Vec<Isometry3<f32>> {
         self.poses(&self.leaves(&device.clone().inner())).to_isometries()
-    }
-
-    pub fn style_values(&self) -> Vec<f32> {
-        self.values[self.style()].iter().map(|&s| s as f32).collect()
     }
 }
 

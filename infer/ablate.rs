@@ -1,0 +1,113 @@
+//! Fig. 7: the shape prior against points that move on their own.
+
+use std::{fs, path::Path};
+
+use anyhow::{Context, Result};
+use burn::tensor::Device;
+use object_pba::{
+    bundle_adjustment::{
+        BundleAdjustmentConfig, bundle_adjust,
+        shape_model::{FreePoints, ShapeModel},
+        unknowns::Unknowns,
+    },
+    checkpoint::Prior,
+    config::write_config,
+    data::{formats::nerfstudio::read_sequence, sequence::Sequence},
+    host::host_points,
+    reconstruction::{Scores, hypotheses, initial_guess, points, score, views},
+};
+
+use crate::{Options, figures, output};
+
+/// Step size of a free point in world units, a tenth of the spacing of 6,144 points on a car.
+const POINT_RATE: f64 = 2e-3;
+
+pub fn ablate(sequences: &[std::path::PathBuf], out: &Path, options: &Options) -> Result<()> {
+    let config = options.bundle_adjustment()?;
+    let device = options.device.device().autodiff();
+    let prior = options.load_prior(&device)?;
+    fs::create_dir_all(out).with_context(|| format!("cannot create {}", out.display()))?;
+    write_config(&out.join("config.toml"), &config)?;
+
+    let mut table = String::from("| sequence | | initial | shape prior | free points |\n");
+    table += "| --- | --- | --- | --- | --- |\n";
+    for path in sequences {
+        let sequence = read_sequence(path)?;
+        let arms = compare(&prior, &sequence, &config, &device)?;
+        for (name, value) in output::ROWS {
+            let cell = |scores: &Scores| value(scores).map_or("–".into(), output::significant);
+            let [initial, with_prior, free] = arms.each_ref().map(|arm| cell(&arm.scores));
+            table +=
+                &format!("| {} | {name} | {initial} | {with_prior} | {free} |\n", sequence.name);
+        }
+        let pictures = arms.each_ref().map(|arm| arm.picture.clone());
+        figures::save(&figures::stacked(&pictures), &out.join(format!("{}.png", sequence.name)))?;
+    }
+    let path = out.join("table.md");
+    fs::write(&path, &table).with_context(|| format!("cannot write {}", path.display()))?;
+    println!("{table}");
+    println!(
+        "Each picture in {} shows the cloud at initialisation, with the shape prior and with",
+        out.display()
+    );
+    println!("free points, from four sides; points that no frame saw are red.");
+    Ok(())
+}
+
+/// One row of the comparison.
+struct Arm {
+    scores: Scores,
+    picture: image::RgbImage,
+}
+
+/// Initialisation, the prior and free points: the same start, losses and budget.
+fn compare(
+    prior: &Prior,
+    sequence: &Sequence,
+    config: &BundleAdjustmentConfig,
+    device: &Device,
+) -> Result<[Arm; 3]> {
+    let guess = initial_guess(prior, sequence, &sequence.frames[0])
+        .with_context(|| format!("{}: the reference frame's mask is empty", sequence.name))?;
+    let generator = &prior.shape.generator;
+    let n_frames = sequence.frames.len();
+    let with_prior = hypotheses(&guess, n_frames, config.objective.parameterisation);
+    let cloud = points(generator, &with_prior[0], device);
+    let free: Vec<Unknowns> = with_prior
+        .iter()
+        .map(|start| start.with_style(host_points(&cloud).as_flattened()))
+        .collect();
+
+    let mut free_config = config.clone();
+    free_config.objective.style_weight = 0.0;
+    free_config.adam.style_rate = POINT_RATE;
+    let arm = |shape: &dyn ShapeModel, unknowns: &Unknowns| Arm {
+        scores: score(sequence, shape, unknowns, &config.objective.pseudo_render, device),
+        picture: picture(sequence, shape, unknowns, config, device),
+    };
+    let adjusted =
+        |shape: &dyn ShapeModel, starts: &[Unknowns], config: &BundleAdjustmentConfig| {
+            let outcome = bundle_adjust(sequence, shape, starts, config, device, &mut |_, _| {});
+            arm(shape, &outcome.unknowns)
+        };
+    Ok([
+        arm(generator, &with_prior[0]),
+        adjusted(generator, &with_prior, config),
+        adjusted(&FreePoints, &free, &free_config),
+    ])
+}
+
+fn picture(
+    sequence: &Sequence,
+    shape: &dyn ShapeModel,
+    unknowns: &Unknowns,
+    config: &BundleAdjustmentConfig,
+    device: &Device,
+) -> image::RgbImage {
+    let views = views(sequence, shape, unknowns, &config.objective.pseudo_render, device);
+    let colors = figures::point_colors(sequence, &views);
+    let colors: Vec<[u8; 3]> = colors.iter().map(|c| c.unwrap_or(figures::UNSEEN)).collect();
+    let cloud = host_points(&points(shape, unknowns, device));
+    let reference = unknowns.camera_from_world(device)[0];
+    figures::cloud_views(sequence, &reference, &cloud, &colors)
+}

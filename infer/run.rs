@@ -1,0 +1,139 @@
+//! One sequence: load, initialise, adjust, judge, write.
+
+use std::{fs, path::Path, time::Instant};
+
+use anyhow::{Context, Result};
+use indicatif::{ProgressBar, ProgressStyle};
+use object_pba::{
+    bundle_adjustment::{
+        BundleAdjustmentConfig, Outcome, Solver, Status, Step, unknowns::Unknowns,
+    },
+    checkpoint::Prior,
+    data::{formats::nerfstudio::read_sequence, sequence::Sequence},
+    device::Backend,
+    reconstruction::{Scores, reconstruct, score},
+};
+use serde::Serialize;
+
+use crate::{Options, assets, output};
+
+/// What `metrics.json` holds.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    pub initial: Scores,
+    #[serde(rename = "final")]
+    pub last: Scores,
+    pub iterations: usize,
+    pub seconds: f64,
+    pub n_points: usize,
+    pub n_frames: usize,
+    pub device: Backend,
+    pub solver: Solver,
+    pub status: Status,
+}
+
+/// A finished reconstruction, with all that figures are made from.
+pub struct Reconstruction {
+    pub outcome: Outcome,
+    pub history: Vec<Step>,
+    pub report: Report,
+}
+
+pub fn demo(out: &Path, options: &Options) -> Result<()> {
+    let sequence = out.join("sequence");
+    assets::unpack_sample_sequence(&sequence)
+        .with_context(|| format!("cannot write to {}", sequence.display()))?;
+    run(&sequence, out, options)
+}
+
+pub fn run(sequence: &Path, out: &Path, options: &Options) -> Result<()> {
+    let config = options.bundle_adjustment()?;
+    let sequence = read_sequence(sequence)?;
+    let device = options.device.device().autodiff();
+    let prior = options.load_prior(&device)?;
+    fs::create_dir_all(out).with_context(|| format!("cannot create {}", out.display()))?;
+
+    let bar = progress_bar(&sequence, &config);
+    let reconstruction =
+        reconstruct_and_score(&prior, &sequence, &config, options.device, &mut |step, _| {
+            bar.inc(1);
+            bar.set_message(format!("blur {} px, objective {:.2}", step.blur, step.objective));
+        })?;
+    bar.finish_and_clear();
+
+    output::write(out, &prior, &sequence, &config, options.device, &reconstruction)?;
+    print_summary(&reconstruction.report);
+    println!("Results are in {}:", out.display());
+    println!("  stages.png       what each stage aligned: reference, target, residual (Fig. 5)");
+    println!("  cloud.png        the point cloud from the reference camera and around it");
+    println!("  points.ply       the cloud, coloured where it was seen");
+    println!("  transforms.json  the camera of every frame");
+    println!("  metrics.json, history.csv, config.toml");
+    Ok(())
+}
+
+/// Reconstructs a sequence and judges it before and after.
+pub fn reconstruct_and_score(
+    prior: &Prior,
+    sequence: &Sequence,
+    config: &BundleAdjustmentConfig,
+    backend: Backend,
+    observe: &mut dyn FnMut(&Step, &Unknowns),
+) -> Result<Reconstruction> {
+    let device = backend.device().autodiff();
+    let start = Instant::now();
+    let mut history = Vec::new();
+    let outcome = reconstruct(prior, sequence, config, &device, &mut |step, unknowns| {
+        history.push(step.clone());
+        observe(step, unknowns);
+    });
+    let outcome = outcome
+        .with_context(|| format!("{}: the reference frame's mask is empty", sequence.name))?;
+    let seconds = start.elapsed().as_secs_f64();
+
+    let generator = &prior.shape.generator;
+    let pseudo_render = &config.objective.pseudo_render;
+    let judge = |unknowns: &Unknowns| score(sequence, generator, unknowns, pseudo_render, &device);
+    let report = Report {
+        initial: judge(&outcome.stages[0].1),
+        last: judge(&outcome.unknowns),
+        iterations: outcome.iterations,
+        seconds,
+        n_points: generator.n_points(),
+        n_frames: sequence.frames.len(),
+        device: backend,
+        solver: config.solver,
+        status: outcome.status,
+    };
+    Ok(Reconstruction { outcome, history, report })
+}
+
+fn progress_bar(sequence: &Sequence, config: &BundleAdjustmentConfig) -> ProgressBar {
+    let bar = ProgressBar::new(config.n_reports() as u64);
+    let style = "{prefix} {bar:30} {pos}/{len} {elapsed_precise} (ETA {eta}) {msg}";
+    bar.set_style(ProgressStyle::with_template(style).expect("a valid template"));
+    bar.set_prefix(sequence.name.clone());
+    bar
+}
+
+fn print_summary(report: &Report) {
+    let Report { initial, last, .. } = report;
+    println!(
+        "{} points, {} frames, {} iterations of {:?} on {} in {:.1} s ({:?})",
+        report.n_points,
+        report.n_frames,
+        report.iterations,
+        report.solver,
+        report.device,
+        report.seconds,
+        report.status
+    );
+    println!("{:<44}{:>12}{:>12}", "", "initial", "final");
+    for (name, value) in output::ROWS {
+        let cell = |scores: &Scores| match value(scores) {
+            Some(value) => output::significant(value),
+            None => "–".into(),
+        };
+        println!("{name:<44}{:>12}{:>12}", cell(initial), cell(last));
+    }
+}

@@ -1,0 +1,148 @@
+//! From a sequence to poses and a cloud: initialise, adjust, score.
+
+use burn::tensor::{Device, Tensor};
+use nalgebra::Isometry3;
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    bundle_adjustment::{
+        BundleAdjustmentConfig, Outcome, Step, bundle_adjust,
+        objective::{Objective, ObjectiveConfig},
+        observations::Observations,
+        shape_model::ShapeModel,
+        unknowns::{Parameterisation, Unknowns},
+    },
+    checkpoint::Prior,
+    data::{
+        crop::{CropCamera, silhouette_box},
+        sequence::{Frame, Sequence},
+    },
+    host::{host_pixels, host_points},
+    loss::MASK_THRESHOLD,
+    metrics::{PoseErrors, style_error},
+    pseudo_render::{PseudoRenderConfig, visible_points},
+};
+
+/// R_s(I_0) and R_p(I_0): what the regressors make of one frame (Sec. 3.2).
+pub struct InitialGuess {
+    pub style: Vec<f32>,
+    /// `camera_from_world`, likeliest first, with the regressor's confidences.
+    pub poses: Vec<(Isometry3<f32>, f32)>,
+}
+
+/// Regresses style and pose from a frame; `None` when its mask is empty.
+pub fn initial_guess(prior: &Prior, sequence: &Sequence, frame: &Frame) -> Option<InitialGuess> {
+    let silhouette = silhouette_box(&frame.mask, MASK_THRESHOLD)?;
+    let (size, margin) = (prior.regressors.crop_size(), prior.regressors.crop_margin());
+    let crop = CropCamera::around(silhouette, &sequence.intrinsics, size, margin);
+    let (color, mask) = crop.warp(&frame.color, &frame.mask);
+    let guess = prior.regressors.regress(&color, &mask, &crop);
+    let to_camera = |(pose, confidence)| (crop.camera_from_world(&pose), confidence);
+    let poses = guess.poses.into_iter().map(to_camera).collect();
+    Some(InitialGuess { style: guess.style, poses })
+}
+
+/// The hypotheses that bundle adjustment starts from: Δp_l = 0, and each pose of the guess.
+pub fn hypotheses(
+    guess: &InitialGuess,
+    n_frames: usize,
+    parameterisation: Parameterisation,
+) -> Vec<Unknowns> {
+    let unknowns = |(pose, _): &(Isometry3<f32>, f32)| {
+        Unknowns::new(*pose, n_frames, &guess.style, parameterisation)
+    };
+    guess.poses.iter().map(unknowns).collect()
+}
+
+/// Initialises from the reference frame and adjusts. `None` when its mask is empty.
+pub fn reconstruct(
+    prior: &Prior,
+    sequence: &Sequence,
+    config: &BundleAdjustmentConfig,
+    device: &Device,
+    observe: &mut dyn FnMut(&Step, &Unknowns),
+) -> Option<Outcome> {
+    let guess = initial_guess(prior, sequence, &sequence.frames[0])?;
+    let parameterisation = config.objective.parameterisation;
+    let hypotheses = hypotheses(&guess, sequence.frames.len(), parameterisation);
+    let generator = &prior.shape.generator;
+    Some(bundle_adjust(sequence, generator, &hypotheses, config, device, observe))
+}
+
+/// One state of a reconstruction, judged: `null` where there is no ground truth.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scores {
+    #[serde(flatten)]
+    pub poses: PoseErrors,
+    /// Eq. 7, raw, in squared world units (diagonal 1).
+    pub style_error: Option<f64>,
+    /// Eq. 3 as printed: on sharp frames, RGB in [0, 1], at full N.
+    pub photometric_loss: f64,
+    /// Eq. 5 as printed, in pixels².
+    pub silhouette_loss: f64,
+}
+
+/// Judges a state by the bare Eq. 3, 5 and 7, whatever the solver minimised.
+pub fn score(
+    sequence: &Sequence,
+    shape: &dyn ShapeModel,
+    unknowns: &Unknowns,
+    pseudo_render: &PseudoRenderConfig,
+    device: &Device,
+) -> Scores {
+    let device = device.clone().inner();
+    let observations = Observations::new(sequence, &[0.0], &device);
+    let config =
+        ObjectiveConfig { pseudo_render: pseudo_render.clone(), ..ObjectiveConfig::paper() };
+    let objective =
+        Objective { observations: &observations, shape, config: &config, device: device.clone() };
+    let bare = objective.evaluate(unknowns, 0);
+
+    let truth = sequence.truth.as_ref();
+    let poses = truth.map(|truth| {
+        let estimate = unknowns.camera_from_world(&device);
+        PoseErrors::new(&estimate, &truth.camera_from_world, truth.canonical)
+    });
+    let true_points = truth.and_then(|truth| truth.points.as_ref());
+    let style_error = true_points.map(|truth| {
+        let truth: Vec<[f32; 3]> = truth.iter().map(|point| point.coords.into()).collect();
+        style_error(&host_points(&points(shape, unknowns, &device)), &truth)
+    });
+    Scores {
+        poses: poses.unwrap_or_default(),
+        style_error,
+        photometric_loss: bare.photometric,
+        silhouette_loss: bare.silhouette,
+    }
+}
+
+/// The cloud of some unknowns, `[1, n, 3]`.
+pub fn points(shape: &dyn ShapeModel, unknowns: &Unknowns, device: &Device) -> Tensor<3> {
+    shape.points(unknowns.leaves(&device.clone().inner()).style).inner()
+}
+
+/// Where every point lands in every frame, and which points each frame sees.
+pub struct Views {
+    /// L lists of n locations, in pixels.
+    pub pixels: Vec<Vec<[f32; 2]>>,
+    /// L lists of point indices.
+    pub visible: Vec<Vec<u32>>,
+}
+
+/// Projects the cloud of some unknowns into all frames.
+pub fn views(
+    sequence: &Sequence,
+    shape: &dyn ShapeModel,
+    unknowns: &Unknowns,
+    pseudo_render: &PseudoRenderConfig,
+    device: &Device,
+) -> Views {
+    let device = device.clone().inner();
+    let poses = unknowns.poses(&unknowns.leaves(&device));
+    let in_camera = poses.camera_from_world(points(shape, unknowns, &device));
+    let projection = sequence.intrinsics.project(in_camera);
+    Views {
+        pixels: host_pixels(&projection.pixels),
+        visible: visible_points(&projection, sequence.size, pseudo_render),
+    }
+}
