@@ -47,7 +47,7 @@ pub fn write(
     let generator = &prior.shape.generator;
     let unknowns = &reconstruction.outcome.unknowns;
     let poses = unknowns.camera_from_world(&device);
-    let names: Vec<String> = (0..poses.len()).map(|l| sequence.frame_name(l)).collect();
+    let names: Vec<_> = sequence.frames.iter().map(|frame| frame.path.clone()).collect();
     let path = out.join("transforms.json");
     write_transforms(&path, &sequence.intrinsics, sequence.size, &poses, &names, true)?;
 

@@ -6,7 +6,7 @@
 use burn::{
     module::Module,
     nn::{Initializer, Linear, LinearConfig},
-    tensor::{Device, Tensor, ops::PadMode, s},
+    tensor::{Device, Tensor, TensorData, ops::PadMode},
 };
 
 /// A convolution with kernel `stride · window` and zero padding `padding`.
@@ -102,17 +102,27 @@ fn patches(picture: Tensor<4>, p: usize) -> Tensor<4> {
 }
 
 /// `[b, h, w, c]` to `[b, h − k + 1, w − k + 1, k · k · c]`: every window becomes a pixel.
+///
+/// One `select` of pixel rows; joining shifted slices along the channels takes 20 times as long.
 fn windows(picture: Tensor<4>, k: usize) -> Tensor<4> {
     if k == 1 {
         return picture;
     }
-    let [_, h, w, _] = picture.dims();
+    let [b, h, w, c] = picture.dims();
     let (rows, columns) = (h - k + 1, w - k + 1);
-    let shifted = (0..k * k).map(|i| {
-        let (y, x) = (i / k, i % k);
-        picture.clone().slice(s![.., y..y + rows, x..x + columns, ..])
-    });
-    Tensor::cat(shifted.collect(), 3)
+    let mut pixel_idx = Vec::with_capacity(b * rows * columns * k * k);
+    for (picture, row, column) in iproduct(b, rows, columns) {
+        for (dy, dx) in (0..k * k).map(|i| (i / k, i % k)) {
+            pixel_idx.push((((picture * h) + row + dy) * w + column + dx) as i64);
+        }
+    }
+    let n = pixel_idx.len();
+    let pixel_idx = Tensor::from_data(TensorData::new(pixel_idx, [n]), &picture.device());
+    picture.reshape([b * h * w, c]).select(0, pixel_idx).reshape([b, rows, columns, k * k * c])
+}
+
+fn iproduct(a: usize, b: usize, c: usize) -> impl Iterator<Item = (usize, usize, usize)> {
+    (0..a * b * c).map(move |i| (i / (b * c), i / c % b, i % c))
 }
 
 #[cfg(test)]

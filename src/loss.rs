@@ -52,65 +52,76 @@ impl Silhouette {
     }
 }
 
-/// The pairs that Eq. 5 adds up for one frame: a projected point each, and the pixel it belongs to.
-#[derive(Default)]
-pub struct SilhouettePairs {
-    point_idx: Vec<u32>,
-    targets: Vec<[f32; 2]>,
-    weights: Vec<f32>,
+/// A projected point, and the silhouette pixel that it belongs to.
+#[derive(Clone, Copy, Debug)]
+pub struct SilhouettePair {
+    pub point_idx: u32,
+    /// The pixel's centre.
+    pub target: [f32; 2],
+    pub weight: f32,
+    /// Distance in pixels from which on the pair counts.
+    pub tolerance: f32,
 }
 
 /// Pairs each silhouette pixel with its nearest projected point, and each point with its nearest
 /// pixel; `weights` are those of the two directions.
 ///
-/// Pairs closer than `tolerance` pixels are left out: a point anywhere inside a pixel is as good as
-/// at its centre. Eq. 5 has none. `visible` are indices into `projected`, and not empty.
+/// So are `tolerances`, the distances in pixels up to which a pair counts as matched. Eq. 5 has none,
+/// and then asks for points exactly at the centres of pixels, and for as many of them as there are
+/// pixels. `visible` are indices into `projected`, and not empty.
 pub fn silhouette_pairs(
     silhouette: &Silhouette,
     projected: &[[f32; 2]],
     visible: &[u32],
     weights: [f32; 2],
-    tolerance: f32,
-) -> SilhouettePairs {
-    let mut pairs = SilhouettePairs::default();
-    let mut pair = |point_idx: u32, target: [f32; 2], weight: f32| {
-        let [u, v] = projected[point_idx as usize];
+    tolerances: [f32; 2],
+) -> Vec<SilhouettePair> {
+    let mut pairs = Vec::new();
+    let mut pair = |point_idx: u32, target: [f32; 2], direction: usize| {
+        let ([u, v], tolerance) = (projected[point_idx as usize], tolerances[direction]);
         if (u - target[0]).powi(2) + (v - target[1]).powi(2) > tolerance * tolerance {
-            pairs.point_idx.push(point_idx);
-            pairs.targets.push(target);
-            pairs.weights.push(weight);
+            pairs.push(SilhouettePair { point_idx, target, weight: weights[direction], tolerance });
         }
     };
     let search = NearestNeighbours::in_plane(visible.iter().map(|&i| projected[i as usize]));
     for &pixel in &silhouette.pixels {
-        pair(visible[search.nearest_pixel(pixel) as usize], pixel, weights[0]);
+        pair(visible[search.nearest_pixel(pixel) as usize], pixel, 0);
     }
     for &point_idx in visible {
-        pair(point_idx, silhouette.nearest(projected[point_idx as usize]), weights[1]);
+        pair(point_idx, silhouette.nearest(projected[point_idx as usize]), 1);
     }
     pairs
 }
 
-/// The weighted squared distances of all pairs, in pixels², on the graph: `[1]`.
+/// The weighted squares of what distances exceed their tolerance by, over all pairs, in pixels², on
+/// the graph: `[1]`.
 ///
 /// `pixels` are the projected points `[b, n, 2]`; each list of pairs comes with its row of them.
-pub fn silhouette_distances(pixels: Tensor<3>, pairs: &[(usize, SilhouettePairs)]) -> Tensor<1> {
+pub fn silhouette_distances(
+    pixels: Tensor<3>,
+    pairs: &[(usize, Vec<SilhouettePair>)],
+) -> Tensor<1> {
     let [b, n, _] = pixels.dims();
-    let n_pairs: usize = pairs.iter().map(|(_, pairs)| pairs.point_idx.len()).sum();
+    let n_pairs: usize = pairs.iter().map(|(_, pairs)| pairs.len()).sum();
     let device = pixels.device().inner();
     if n_pairs == 0 {
         return Tensor::zeros([1], &device);
     }
-    let rows = pairs.iter().flat_map(|(row, pairs)| {
-        pairs.point_idx.iter().map(move |&point_idx| (row * n + point_idx as usize) as i64)
-    });
+    let all = || pairs.iter().flat_map(|(row, pairs)| pairs.iter().map(move |pair| (row, pair)));
+    let rows = all().map(|(row, pair)| (row * n + pair.point_idx as usize) as i64);
     let rows = index_tensor(rows.collect(), &pixels);
-    let targets: Vec<f32> =
-        pairs.iter().flat_map(|(_, pairs)| pairs.targets.as_flattened()).copied().collect();
-    let targets = Tensor::<2>::from_data(TensorData::new(targets, [n_pairs, 2]), &device);
-    let weights: Vec<f32> = pairs.iter().flat_map(|(_, pairs)| &pairs.weights).copied().collect();
-    let weights = Tensor::<2>::from_data(TensorData::new(weights, [n_pairs, 1]), &device);
+    let column = |values: Vec<f32>| {
+        let columns = values.len() / n_pairs;
+        Tensor::<2>::from_data(TensorData::new(values, [n_pairs, columns]), &device)
+    };
+    let targets = column(all().flat_map(|(_, pair)| pair.target).collect());
+    let weights = column(all().map(|(_, pair)| pair.weight).collect());
+    let tolerances = column(all().map(|(_, pair)| pair.tolerance).collect());
 
     let offsets = pixels.reshape([b * n, 2]).select(0, rows) - targets;
-    (offsets.square() * weights).sum()
+    let squared = offsets.square().sum_dim(1); // [pairs, 1]
+    // (d − τ)² = d² − τ (2 d − τ), whose derivative stays finite where τ = 0 and d = 0.
+    let distances = (squared.clone() + tolerances.clone().equal_elem(0.0).float()).sqrt();
+    let excess = squared - (distances * 2.0 - tolerances.clone()) * tolerances;
+    (excess * weights).sum()
 }

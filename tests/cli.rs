@@ -114,25 +114,25 @@ fn estimated_cameras_are_a_sequence_of_the_same_convention() {
 #[test]
 fn a_missing_frame_is_named() {
     let sequence = sample();
-    fs::remove_file(sequence.path().join("images/0003.png")).unwrap();
-    check_refused(&run(sequence.path(), &[]), &["0003.png"]);
+    fs::remove_file(sequence.path().join("images/frame_003.png")).unwrap();
+    check_refused(&run(sequence.path(), &[]), &["frame_003.png"]);
 }
 
 #[test]
 fn a_frame_of_another_size_is_named() {
     let sequence = sample();
-    let path = sequence.path().join("images/0002.png");
+    let path = sequence.path().join("images/frame_002.png");
     image::RgbImage::new(64, 32).save(&path).unwrap();
-    check_refused(&run(sequence.path(), &[]), &["0002.png", "64"]);
+    check_refused(&run(sequence.path(), &[]), &["frame_002.png", "64"]);
 }
 
 #[test]
 fn a_truncated_frame_is_named() {
     let sequence = sample();
-    let path = sequence.path().join("images/0001.png");
+    let path = sequence.path().join("images/frame_001.png");
     let bytes = fs::read(&path).unwrap();
     fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-    check_refused(&run(sequence.path(), &[]), &["0001.png"]);
+    check_refused(&run(sequence.path(), &[]), &["frame_001.png"]);
 }
 
 #[test]

@@ -25,7 +25,10 @@ fn an_effective_config_reads_back_as_it_was() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("config.toml");
     write_config(&path, &BundleAdjustmentConfig::paper()).unwrap();
-    assert_eq!(read_config::<BundleAdjustmentConfig>(&path).unwrap(), BundleAdjustmentConfig::paper());
+    assert_eq!(
+        read_config::<BundleAdjustmentConfig>(&path).unwrap(),
+        BundleAdjustmentConfig::paper()
+    );
 }
 
 #[test]

@@ -1,1 +1,103 @@
-fn main() {}
+//! pba-train: the shape prior, then the regressors, into a folder that `pba-infer` reads.
+
+use std::{path::PathBuf, process::ExitCode};
+
+use clap::{Args, Parser, Subcommand};
+use object_pba::{
+    Result,
+    device::Backend,
+    training::{TrainingConfig, train_regressors, train_shape_prior},
+};
+use render::RenderArguments;
+
+mod render;
+
+/// Trains a shape prior and its regressors, and renders sequences to try them on.
+#[derive(Parser)]
+#[command(version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Train the autoencoder of shapes.
+    Prior(Arguments),
+    /// Train the style and pose regressors, on a finished prior.
+    Regressors(Arguments),
+    /// Train both.
+    All(Arguments),
+    /// Render sequences with their ground truth.
+    Render(RenderArguments),
+}
+
+/// Interrupt training whenever you like: the same command goes on from its last checkpoint.
+#[derive(Args)]
+struct Arguments {
+    /// What to train: a preset such as configs/car-small.toml.
+    #[arg(long)]
+    config: PathBuf,
+    /// Folder for the weights, the effective config and metrics.jsonl.
+    #[arg(long)]
+    out: PathBuf,
+    #[arg(long, default_value_t)]
+    device: Backend,
+    /// Replaces the config's seed.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Folder of ShapeNetCore, v1 or v2; without it, shapes are procedural cars.
+    #[arg(long)]
+    shapenet: Option<PathBuf>,
+    /// Category within it.
+    #[arg(long)]
+    synset: Option<String>,
+    /// Take only model ids like this, `*` standing for anything; may be repeated.
+    #[arg(long, value_name = "PATTERN")]
+    include: Vec<String>,
+    /// Leave out model ids like this; may be repeated.
+    #[arg(long, value_name = "PATTERN")]
+    exclude: Vec<String>,
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Prior(arguments) => train(&arguments, true, false),
+        Command::Regressors(arguments) => train(&arguments, false, true),
+        Command::All(arguments) => train(&arguments, true, true),
+        Command::Render(arguments) => render::render(&arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", error.to_string().trim_end().replace('\n', " "));
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn train(arguments: &Arguments, prior: bool, regressors: bool) -> Result<()> {
+    let config = arguments.config()?;
+    let device = arguments.device.device();
+    if prior {
+        train_shape_prior(&config, &arguments.out, &device)?;
+    }
+    if regressors {
+        train_regressors(&config, &arguments.out, &device)?;
+    }
+    Ok(())
+}
+
+impl Arguments {
+    /// The preset, with what the command line says instead.
+    fn config(&self) -> Result<TrainingConfig> {
+        let mut config = TrainingConfig::read(&self.config)?;
+        config.seed = self.seed.unwrap_or(config.seed);
+        let data = &mut config.data;
+        data.shapenet = self.shapenet.clone().or(data.shapenet.take());
+        data.synset = self.synset.clone().unwrap_or_else(|| data.synset.clone());
+        data.include.extend(self.include.iter().cloned());
+        data.exclude.extend(self.exclude.iter().cloned());
+        Ok(config)
+    }
+}

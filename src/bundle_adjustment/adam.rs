@@ -75,6 +75,9 @@ impl Adam {
             let decay = warm_up * (0.05 + 0.95 * 0.5 * (1.0 + (PI * done).cos()));
             let relative_only =
                 level == 0 && (iteration as f64) < config.relative_first * config.iterations as f64;
+            if evaluation.gradient.is_empty() {
+                break;
+            }
             self.step(unknowns, &evaluation.gradient, config, decay, relative_only);
         }
         let last = objective.evaluate(unknowns, level);

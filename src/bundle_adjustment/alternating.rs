@@ -115,6 +115,7 @@ fn block_cost(
     move |x| {
         unknowns.values[range.clone()].copy_from_slice(x);
         let Evaluation { objective, gradient, .. } = evaluate(&unknowns);
-        (objective, gradient[range.clone()].to_vec())
+        let zeros = || vec![0.0; range.len()];
+        (objective, gradient.get(range.clone()).map_or_else(zeros, <[f64]>::to_vec))
     }
 }

@@ -2,7 +2,10 @@
 
 pub mod adam;
 pub mod alternating;
+pub mod correspondences;
 pub mod lbfgs;
+pub mod levenberg_marquardt;
+mod linearisation;
 pub mod objective;
 pub mod observations;
 pub mod shape_model;
@@ -14,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use self::{
     adam::{Adam, AdamConfig},
     alternating::AlternatingConfig,
+    levenberg_marquardt::LevenbergMarquardtConfig,
     objective::{Evaluation, Objective, ObjectiveConfig},
     observations::Observations,
     shape_model::ShapeModel,
@@ -28,6 +32,8 @@ pub enum Solver {
     /// All unknowns together, by Adam.
     #[default]
     Adam,
+    /// All unknowns together, by Levenberg–Marquardt.
+    Lm,
     /// Algorithm 1 as printed: L-BFGS on each Δp_l in parallel, then p_0, then s.
     AlternatingLbfgs,
 }
@@ -42,6 +48,7 @@ pub struct BundleAdjustmentConfig {
     pub n_hypotheses: usize,
     pub objective: ObjectiveConfig,
     pub adam: AdamConfig,
+    pub lm: LevenbergMarquardtConfig,
     pub alternating: AlternatingConfig,
 }
 
@@ -53,6 +60,7 @@ impl Default for BundleAdjustmentConfig {
             n_hypotheses: 2,
             objective: ObjectiveConfig::default(),
             adam: AdamConfig::default(),
+            lm: LevenbergMarquardtConfig::default(),
             alternating: AlternatingConfig::default(),
         }
     }
@@ -63,6 +71,7 @@ impl BundleAdjustmentConfig {
     pub fn preset(solver: Solver) -> Self {
         match solver {
             Solver::Adam => Self::default(),
+            Solver::Lm => Self { solver, ..Self::default() },
             Solver::AlternatingLbfgs => Self::paper(),
         }
     }
@@ -71,6 +80,7 @@ impl BundleAdjustmentConfig {
     pub fn n_reports(&self) -> usize {
         let per_level = match self.solver {
             Solver::Adam => self.adam.iterations + 1,
+            Solver::Lm => self.lm.iterations + 1,
             Solver::AlternatingLbfgs => 3 * self.alternating.max_rounds + 1,
         };
         per_level * (self.n_hypotheses.max(1) + self.blurs.len() - 1)
@@ -232,12 +242,16 @@ impl Run {
             Solver::Adam => {
                 self.adam.run(objective, &mut self.unknowns, levels, &config.adam, progress)
             }
+            Solver::Lm => {
+                let config = &config.lm;
+                levenberg_marquardt::run(objective, &mut self.unknowns, level, config, progress)
+            }
             Solver::AlternatingLbfgs => {
                 let config = &config.alternating;
                 alternating::run(objective, &mut self.unknowns, level, config, progress)
             }
         };
-        if config.solver == Solver::Adam {
+        if config.solver != Solver::AlternatingLbfgs {
             progress.end_stage(&format!("blur {}", progress.blur), &self.unknowns);
         }
     }

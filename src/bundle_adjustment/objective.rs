@@ -1,18 +1,18 @@
 //! L = L_ph + λ L_CD (Eq. 6), with what later work added to make it well behaved.
 
 use burn::tensor::{Device, Tensor, TensorData, s};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
+    correspondences::Correspondences,
     observations::Observations,
     shape_model::ShapeModel,
     unknowns::{Leaves, Parameterisation, Unknowns, flatten},
 };
 use crate::{
-    host::{host_pixels, index_tensor},
-    loss::{charbonnier, silhouette_distances, silhouette_pairs},
-    pseudo_render::{PseudoRenderConfig, visible_points},
+    host::index_tensor,
+    loss::{charbonnier, silhouette_distances},
+    pseudo_render::PseudoRenderConfig,
 };
 
 /// How terms add up over points, pixels and frames.
@@ -43,10 +43,16 @@ pub struct ObjectiveConfig {
     pub target_occlusion: bool,
     /// λ, the weight of L_CD.
     pub silhouette_weight: f32,
-    /// Distance in pixels below which points and silhouette count as matched.
-    pub silhouette_tolerance: f32,
+    /// Distance below which a silhouette's pixel counts as covered by a point, in units of
+    /// √(image area / N), the spacing if the points filled the image.
+    pub coverage_tolerance: f32,
+    /// Distance in pixels below which a point counts as inside the silhouette.
+    pub containment_tolerance: f32,
     /// Let the reference frame's silhouette count, and average over L frames instead of L − 1.
     pub silhouette_of_reference: bool,
+    /// Let hidden points count in the silhouette, too: they lie inside it as well, and close the
+    /// gaps between the visible ones.
+    pub silhouette_of_hidden_points: bool,
     /// Weight of the mean squared style: the whitened style is a unit Gaussian.
     pub style_weight: f32,
     pub pseudo_render: PseudoRenderConfig,
@@ -62,8 +68,10 @@ impl Default for ObjectiveConfig {
             within_masks: true,
             target_occlusion: true,
             silhouette_weight: 10.0,
-            silhouette_tolerance: 0.7,
+            coverage_tolerance: 1.0,
+            containment_tolerance: 0.7,
             silhouette_of_reference: true,
+            silhouette_of_hidden_points: true,
             style_weight: 1.0,
             pseudo_render: PseudoRenderConfig::default(),
         }
@@ -81,8 +89,10 @@ impl ObjectiveConfig {
             within_masks: false,
             target_occlusion: false,
             silhouette_weight: 0.01,
-            silhouette_tolerance: 0.0,
+            coverage_tolerance: 0.0,
+            containment_tolerance: 0.0,
             silhouette_of_reference: false,
+            silhouette_of_hidden_points: false,
             style_weight: 0.0,
             pseudo_render: PseudoRenderConfig::default(),
         }
@@ -99,10 +109,10 @@ pub struct Objective<'a> {
 }
 
 /// L_ph and L_CD on the graph, unweighted, and the number of points that the reference sees.
-pub struct Terms {
-    pub photometric: Tensor<1>,
-    pub silhouette: Tensor<1>,
-    pub n_visible: usize,
+struct Terms {
+    photometric: Tensor<1>,
+    silhouette: Tensor<1>,
+    n_visible: usize,
 }
 
 /// The objective and its gradient at some unknowns, on the host.
@@ -112,7 +122,7 @@ pub struct Evaluation {
     pub photometric: f64,
     pub silhouette: f64,
     pub n_visible: usize,
-    /// In the order of [`Unknowns::values`].
+    /// In the order of [`Unknowns::values`]; empty where nothing depends on them.
     pub gradient: Vec<f64>,
 }
 
@@ -121,6 +131,22 @@ impl Objective<'_> {
     pub fn evaluate(&self, unknowns: &Unknowns, level: usize) -> Evaluation {
         let targets: Vec<usize> = (1..unknowns.n_frames()).collect();
         self.evaluate_targets(unknowns, &targets, level)
+    }
+
+    /// [`evaluate`](Self::evaluate) without the gradient, which is left empty.
+    pub fn value(&self, unknowns: &Unknowns, level: usize) -> Evaluation {
+        let device = self.device.clone().inner();
+        Objective { device, ..*self }.evaluate(unknowns, level)
+    }
+
+    /// What the current estimate has compared with what, over all frames.
+    pub fn correspondences(&self, unknowns: &Unknowns) -> Correspondences {
+        let leaves = unknowns.leaves(&self.device.clone().inner());
+        let points = self.shape.points(leaves.style.clone()).inner();
+        let points_in_camera = unknowns.poses(&leaves).camera_from_world(points);
+        let projection = self.observations.intrinsics.project(points_in_camera);
+        let frames = (0..unknowns.n_frames()).collect();
+        Correspondences::new(self.observations, frames, &projection, self.config)
     }
 
     /// The objective over the reference frame and some targets.
@@ -148,13 +174,13 @@ impl Objective<'_> {
             n_visible: terms.n_visible,
             gradient: match objective.is_tracked() {
                 true => flatten(&leaves, &objective.backward()),
-                false => vec![0.0; unknowns.values.len()],
+                false => Vec::new(),
             },
         }
     }
 
     /// The terms over the reference frame and some targets, for a cloud `[1, n, 3]`.
-    pub fn terms(
+    fn terms(
         &self,
         unknowns: &Unknowns,
         leaves: &Leaves,
@@ -167,111 +193,45 @@ impl Objective<'_> {
         let poses = unknowns.poses(leaves).select(index_tensor(frame_idx, &points_in_world));
         let points_in_camera = poses.camera_from_world(points_in_world);
         let projection = self.observations.intrinsics.project(points_in_camera);
-        let visible =
-            visible_points(&projection, self.observations.size, &self.config.pseudo_render);
-        let host_pixels = host_pixels(&projection.pixels);
+        let matches = Correspondences::new(self.observations, frames, &projection, self.config);
         let pixels = projection.pixels; // [1 + t, n, 2]
         Terms {
-            photometric: self.photometric(&frames, pixels.clone(), &host_pixels, &visible, level),
-            silhouette: self.silhouette(&frames, pixels, &host_pixels, &visible),
-            n_visible: visible[0].len(),
+            photometric: self.photometric(&matches, pixels.clone(), level),
+            silhouette: silhouette_distances(pixels, &matches.pairs)
+                / matches.pairs.len().max(1) as f32,
+            n_visible: matches.visible[0].len(),
         }
     }
 
     /// L_ph (Eq. 3), over the points that the reference frame sees.
-    fn photometric(
-        &self,
-        frames: &[usize],
-        pixels: Tensor<3>,
-        host_pixels: &[Vec<[f32; 2]>],
-        visible: &[Vec<u32>],
-        level: usize,
-    ) -> Tensor<1> {
+    fn photometric(&self, matches: &Correspondences, pixels: Tensor<3>, level: usize) -> Tensor<1> {
         let [_, n, _] = pixels.dims();
-        let n_targets = frames.len() - 1;
-        let seen = &visible[0];
-        if n_targets == 0 || seen.is_empty() {
-            // Nothing to compare is the worst that can be, not the best: every channel of every
-            // point is as wrong as colours can be.
-            let worst = 3.0 * n_targets as f32;
-            let worst =
-                if self.config.reduction == Reduction::Sum { worst * n as f32 } else { 3.0 };
-            let worst = if n_targets == 0 { 0.0 } else { worst };
+        let (n_targets, seen) = (matches.frames.len() - 1, &matches.visible[0]);
+        if n_targets == 0 {
+            return Tensor::zeros([1], &pixels.device());
+        }
+        if seen.is_empty() {
+            // Nothing to compare is the worst that can be, not the best: all three channels of
+            // every point are as wrong as colours can be.
+            let worst = match self.config.reduction {
+                Reduction::Sum => 3.0 * (n_targets * n) as f32,
+                Reduction::Mean => 3.0,
+            };
             return Tensor::from_floats([worst], &pixels.device());
         }
-
+        let images = &self.observations.images[level];
         let seen_idx = index_tensor(seen.iter().map(|&i| i64::from(i)).collect(), &pixels);
-        let colors =
-            self.observations.images[level].sample_bilinear(frames, pixels.select(1, seen_idx));
+        let colors = images.sample_bilinear(&matches.frames, pixels.select(1, seen_idx));
         let residuals = colors.clone().slice(s![0..1]) - colors.slice(s![1..]); // [t, m, 3]
         let mut squared = residuals.square().sum_dim(2).squeeze_dim::<2>(2);
         if self.config.robust_scale > 0.0 {
             squared = charbonnier(squared, self.config.robust_scale);
         }
-        let mut n_compared = (n_targets * seen.len()) as f32;
-        if self.config.within_masks || self.config.target_occlusion {
-            let weights = self.comparable(frames, host_pixels, visible);
-            n_compared = weights.iter().sum::<f32>().max(1.0);
-            let weights = TensorData::new(weights, [n_targets, seen.len()]);
-            squared = squared * Tensor::from_data(weights, &self.device.clone().inner());
-        }
+        let weights = TensorData::new(matches.comparable.concat(), [n_targets, seen.len()]);
+        let sum = (squared * Tensor::from_data(weights, &self.device.clone().inner())).sum();
         match self.config.reduction {
-            Reduction::Sum => squared.sum(),
-            Reduction::Mean => squared.sum() / n_compared,
+            Reduction::Sum => sum,
+            Reduction::Mean => sum / matches.n_compared(),
         }
-    }
-
-    /// 1 where a target's colour may be compared with the reference's, else 0: `[t · m]`.
-    fn comparable(
-        &self,
-        frames: &[usize],
-        host_pixels: &[Vec<[f32; 2]>],
-        visible: &[Vec<u32>],
-    ) -> Vec<f32> {
-        let of_target = |t: usize| {
-            let mut occluded = vec![self.config.target_occlusion; host_pixels[t].len()];
-            visible[t].iter().for_each(|&i| occluded[i as usize] = false);
-            let in_masks = move |i: usize| {
-                let inside = |f: usize| self.observations.in_mask(frames[f], host_pixels[f][i]);
-                !self.config.within_masks || (inside(0) && inside(t))
-            };
-            visible[0]
-                .iter()
-                .map(move |&i| i as usize)
-                .map(move |i| if !occluded[i] && in_masks(i) { 1.0 } else { 0.0 })
-        };
-        (1..frames.len()).flat_map(of_target).collect()
-    }
-
-    /// L_CD (Eq. 5), averaged over the frames that have a silhouette.
-    fn silhouette(
-        &self,
-        frames: &[usize],
-        pixels: Tensor<3>,
-        host_pixels: &[Vec<[f32; 2]>],
-        visible: &[Vec<u32>],
-    ) -> Tensor<1> {
-        // One frame alone has nothing but its own silhouette.
-        let first = usize::from(!self.config.silhouette_of_reference && frames.len() > 1);
-        let everything: Vec<u32> = (0..host_pixels[0].len() as u32).collect();
-        let pairs: Vec<_> = (first..frames.len())
-            .into_par_iter()
-            .filter_map(|f| {
-                let silhouette = self.observations.silhouettes[frames[f]].as_ref()?;
-                // Where nothing is seen, every point is called back.
-                let visible = if visible[f].is_empty() { &everything } else { &visible[f] };
-                let weights = match self.config.reduction {
-                    Reduction::Sum => [1.0; 2],
-                    Reduction::Mean => {
-                        [silhouette.pixels.len(), visible.len()].map(|count| 1.0 / count as f32)
-                    }
-                };
-                let tolerance = self.config.silhouette_tolerance;
-                let pixels = &host_pixels[f];
-                Some((f, silhouette_pairs(silhouette, pixels, visible, weights, tolerance)))
-            })
-            .collect();
-        let n_frames = pairs.len().max(1) as f32;
-        silhouette_distances(pixels, &pairs) / n_frames
     }
 }

@@ -17,6 +17,8 @@ pub struct Observations {
     pub size: [usize; 2],
     /// The frames at each level of blur.
     pub(super) images: Vec<ImageTable>,
+    /// The same on the host.
+    pub(super) host_images: Vec<Vec<ColorImage>>,
     pub(super) silhouettes: Vec<Option<Silhouette>>,
     masks: Vec<ScalarImage>,
 }
@@ -30,13 +32,14 @@ impl Observations {
                 true => image::imageops::blur(image, blur),
                 false => image.clone(),
             };
-            let images: Vec<_> = sequence.frames.par_iter().map(|f| blurred(&f.color)).collect();
-            ImageTable::new(&images, device)
+            sequence.frames.par_iter().map(|f| blurred(&f.color)).collect()
         };
+        let host_images: Vec<Vec<ColorImage>> = blurs.iter().map(level).collect();
         Self {
             intrinsics: sequence.intrinsics,
             size: sequence.size,
-            images: blurs.iter().map(level).collect(),
+            images: host_images.iter().map(|level| ImageTable::new(level, device)).collect(),
+            host_images,
             silhouettes: sequence.frames.iter().map(|f| Silhouette::new(&f.mask)).collect(),
             masks: sequence.frames.iter().map(|frame| frame.mask.clone()).collect(),
         }

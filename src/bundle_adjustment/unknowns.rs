@@ -119,6 +119,27 @@ impl Unknowns {
         }
     }
 
+    /// The unknowns after a small step: rotations step on the left, R ← exp(δω) R, the rest adds up.
+    ///
+    /// `step` is laid out as [p_0 | s | Δp_1 | …], with the leading `n_directions` of the style.
+    pub fn stepped(&self, step: &[f64], n_directions: usize) -> Self {
+        let mut unknowns = self.clone();
+        let turn_by = |twist: &mut [f64], step: &[f64]| {
+            let rotation = |w: &[f64]| UnitQuaternion::from_scaled_axis(Vector3::from_row_slice(w));
+            let turned = rotation(&step[..3]) * rotation(&twist[..3]);
+            twist[..3].copy_from_slice(turned.scaled_axis().as_slice());
+            (3..6).for_each(|i| twist[i] += step[i]);
+        };
+        turn_by(&mut unknowns.values[Self::REFERENCE], &step[..6]);
+        for l in 1..self.n_frames {
+            let start = 6 + n_directions + 6 * (l - 1);
+            turn_by(&mut unknowns.values[Self::relative(l)], &step[start..start + 6]);
+        }
+        let style = self.style().start;
+        (0..n_directions).for_each(|i| unknowns.values[style + i] += step[6 + i]);
+        unknowns
+    }
+
     /// p_0 and each p_l = p_0 ∘ Δp_l, in order, `[L, …]`.
     pub fn poses(&self, leaves: &Leaves) -> Pose {
         let device = leaves.reference_twist.device();

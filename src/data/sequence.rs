@@ -4,6 +4,8 @@
 //! to the camera around a random sampled axis to create a sequence of 15 frames, each of 2° rotation
 //! from its predecessor." The axis runs through the object's centre, so the object stays in view.
 
+use std::path::PathBuf;
+
 use nalgebra::{Isometry3, Point3, Unit, UnitQuaternion, Vector3};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -32,6 +34,8 @@ pub struct Sequence {
 
 #[derive(Clone, Debug)]
 pub struct Frame {
+    /// The picture's file, relative to the sequence's folder.
+    pub path: PathBuf,
     pub color: ColorImage,
     /// How much of each pixel the object covers, in [0, 1].
     pub mask: ScalarImage,
@@ -96,9 +100,10 @@ impl Sequence {
 
         let scene = Scene::random(&mut scene_rng, ground);
         let renderer = Renderer::new(mesh);
-        let frames = camera_from_world.iter().map(|pose| {
+        let frames = camera_from_world.iter().enumerate().map(|(idx, pose)| {
             let rendering = renderer.render(&scene, pose, &start.intrinsics, start.size);
-            Frame { color: rendering.color, mask: rendering.coverage }
+            let path = format!("images/frame_{idx:03}.png").into();
+            Frame { path, color: rendering.color, mask: rendering.coverage }
         });
         Self {
             name: format!("seed_{seed}"),

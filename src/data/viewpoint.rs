@@ -149,7 +149,10 @@ fn framed(
     size: [usize; 2],
     framing: Framing,
 ) -> Isometry3<f32> {
+    /// Usually half of them are needed.
     const CORRECTIONS: usize = 20;
+    /// A correction this small, relative to the distance, moves the box by a hundredth of a pixel.
+    const SETTLED: f32 = 1e-4;
     let frame = size.map(|side| side as f32);
     let radius = points_in_world.iter().map(|point| point.coords.norm()).fold(1e-3, f32::max);
     let mut pose = Isometry3::from_parts(Translation3::new(0.0, 0.0, 4.0 * radius), rotation);
@@ -163,6 +166,7 @@ fn framed(
         let center = [(left + right) / 2.0, (top + bottom) / 2.0];
         let fill = (extent[0] / frame[0]).max(extent[1] / frame[1]);
 
+        let before = pose.translation.vector;
         let nearest = (pose.translation.vector.z - radius) * fill / framing.fill;
         pose.translation.vector.z = radius + nearest;
         for axis in 0..2 {
@@ -170,6 +174,9 @@ fn framed(
             let target = frame[axis] / 2.0 + framing.off_centre[axis] * slack;
             let step = (target - center[axis]) * nearest / intrinsics.focal[axis];
             pose.translation.vector[axis] += step;
+        }
+        if (pose.translation.vector - before).norm() < SETTLED * nearest {
+            break;
         }
     }
     pose

@@ -28,6 +28,8 @@ pub(crate) const COARSEST_SIDE: usize = 4;
 pub struct ShapePriorConfig {
     /// Numbers in a latent; the style keeps those directions along which shapes differ.
     pub n_latent: usize,
+    /// Points that the encoder is trained on; it sees other numbers less well.
+    pub n_encoder_points: usize,
     /// Widths of the layers that see a point alone.
     pub encoder_widths: [usize; 3],
     /// Points of the fully connected branch, and the width of its last hidden layer.
@@ -43,6 +45,7 @@ impl Default for ShapePriorConfig {
     fn default() -> Self {
         Self {
             n_latent: 64,
+            n_encoder_points: 1024,
             encoder_widths: [64, 128, 256],
             n_fc_points: 2048,
             fc_width: 512,
@@ -60,12 +63,14 @@ impl ShapePriorConfig {
 
     /// Why no network has these sizes, if none has.
     pub fn check(&self) -> Result<(), String> {
-        let sizes = [self.n_latent, self.n_fc_points, self.fc_width, self.grid_channels];
+        let (n_latent, n_encoder_points) = (self.n_latent, self.n_encoder_points);
+        let sizes =
+            [n_latent, n_encoder_points, self.n_fc_points, self.fc_width, self.grid_channels];
         if sizes.iter().chain(&self.encoder_widths).any(|&size| size == 0) {
             return Err("the sizes of the shape prior must be positive".into());
         }
         let doublings = self.grid_side / COARSEST_SIDE;
-        if self.grid_side % COARSEST_SIDE != 0 || !doublings.is_power_of_two() {
+        if !self.grid_side.is_multiple_of(COARSEST_SIDE) || !doublings.is_power_of_two() {
             return Err(format!("grid_side is {}, not 4, 8, 16, 32, …", self.grid_side));
         }
         Ok(())
@@ -100,6 +105,11 @@ pub struct ShapePrior {
 }
 
 impl ShapePrior {
+    /// Numbers in a style.
+    pub fn n_style(&self) -> usize {
+        self.generator.n_style()
+    }
+
     /// Styles `[b, k]` of clouds `[b, n, 3]`, in world units; any number of surface points will do.
     pub fn encode(&self, points: Tensor<3>) -> Tensor<2> {
         self.generator.whitening.style_from_latent(self.encoder.forward(points))
@@ -120,6 +130,7 @@ pub(crate) mod tests {
     pub fn tiny() -> ShapePriorConfig {
         ShapePriorConfig {
             n_latent: 6,
+            n_encoder_points: 50,
             encoder_widths: [8, 8, 16],
             n_fc_points: 64,
             fc_width: 32,

@@ -35,7 +35,7 @@ pub fn read_frame(folder: &Path, entry: &FrameEntry) -> Result<Frame> {
     if mask.pixels().all(|coverage| coverage.0[0] < COVERED) {
         return Err(unusable(&mask_path, "the mask is empty"));
     }
-    Ok(Frame { color: picture.into_rgb32f(), mask })
+    Ok(Frame { path: entry.file_path.clone(), color: picture.into_rgb32f(), mask })
 }
 
 /// Writes a picture as an 8-bit PNG.

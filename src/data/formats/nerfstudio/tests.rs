@@ -6,6 +6,9 @@ use tempfile::TempDir;
 use super::*;
 use crate::data::{ColorImage, ScalarImage, sequence::Frame, viewpoint::look_at};
 
+/// What is wrong with a description.
+type Edit = fn(&mut Value);
+
 fn temporary() -> TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
@@ -13,6 +16,7 @@ fn temporary() -> TempDir {
 /// Two 4 × 3 frames with a pose each.
 fn sequence() -> Sequence {
     let frame = |shift: u32| Frame {
+        path: format!("images/frame_{shift:03}.png").into(),
         color: ColorImage::from_fn(4, 3, |x, y| Rgb([x + shift, y, 2].map(|v| v as f32 / 5.0))),
         mask: ScalarImage::from_fn(4, 3, |x, _| Luma([x as f32 / 3.0])),
     };
@@ -101,7 +105,7 @@ fn nerf_s_own_layout_is_read() {
 
 #[test]
 fn broken_descriptions_are_refused() {
-    let edits: [(fn(&mut Value), &str); 12] = [
+    let edits: [(Edit, &str); 12] = [
         (|json| json["frames"] = json!([]), "no frames"),
         (|json| json["frames"] = json!("none"), "invalid type"),
         (|json| json["fl_x"] = json!(0.0), "not positive"),

@@ -1,0 +1,105 @@
+//! What is compared with what, decided outside the graph from the current estimate: which points a
+//! view sees, which colours may be compared, which silhouette pixel belongs to which point.
+
+use rayon::prelude::*;
+
+use super::{
+    objective::{ObjectiveConfig, Reduction},
+    observations::Observations,
+};
+use crate::{
+    camera::Projection,
+    host::host_pixels,
+    loss::{SilhouettePair, silhouette_pairs},
+    pseudo_render::visible_points,
+};
+
+/// The correspondences of the reference frame and some targets.
+pub struct Correspondences {
+    /// The frames, the reference first.
+    pub frames: Vec<usize>,
+    /// Where every point lands in each of them, in pixels.
+    pub pixels: Vec<Vec<[f32; 2]>>,
+    /// The points that each of them sees.
+    pub visible: Vec<Vec<u32>>,
+    /// For each target, 1 where a point that the reference sees may be compared, else 0: `[t][m]`.
+    pub comparable: Vec<Vec<f32>>,
+    /// The silhouette's pairs, each list with its place in `frames`.
+    pub pairs: Vec<(usize, Vec<SilhouettePair>)>,
+}
+
+impl Correspondences {
+    /// `projection` holds the points in each of `frames`, `[1 + t, n, …]`.
+    pub fn new(
+        observations: &Observations,
+        frames: Vec<usize>,
+        projection: &Projection,
+        config: &ObjectiveConfig,
+    ) -> Self {
+        let visible = visible_points(projection, observations.size, &config.pseudo_render);
+        let pixels = host_pixels(&projection.pixels);
+        let comparable = (1..frames.len())
+            .into_par_iter()
+            .map(|t| {
+                comparable(observations, [frames[0], frames[t]], [0, t], &pixels, &visible, config)
+            })
+            .collect();
+        let pairs = pairs(observations, &frames, &pixels, &visible, config);
+        Self { frames, pixels, visible, comparable, pairs }
+    }
+
+    /// How many colours are compared, all targets together; at least one.
+    pub fn n_compared(&self) -> f32 {
+        self.comparable.iter().flatten().sum::<f32>().max(1.0)
+    }
+}
+
+/// Whether each point that the reference sees may be compared with one target.
+fn comparable(
+    observations: &Observations,
+    frames: [usize; 2],
+    [reference, target]: [usize; 2],
+    pixels: &[Vec<[f32; 2]>],
+    visible: &[Vec<u32>],
+    config: &ObjectiveConfig,
+) -> Vec<f32> {
+    let mut hidden = vec![config.target_occlusion; pixels[target].len()];
+    visible[target].iter().for_each(|&i| hidden[i as usize] = false);
+    let may = |i: usize| {
+        let inside = !config.within_masks
+            || (observations.in_mask(frames[0], pixels[reference][i])
+                && observations.in_mask(frames[1], pixels[target][i]));
+        inside && !hidden[i]
+    };
+    visible[reference].iter().map(|&i| if may(i as usize) { 1.0 } else { 0.0 }).collect()
+}
+
+/// The pairs that Eq. 5 adds up, for each frame that has a silhouette.
+fn pairs(
+    observations: &Observations,
+    frames: &[usize],
+    pixels: &[Vec<[f32; 2]>],
+    visible: &[Vec<u32>],
+    config: &ObjectiveConfig,
+) -> Vec<(usize, Vec<SilhouettePair>)> {
+    // One frame alone has nothing but its own silhouette.
+    let first = usize::from(!config.silhouette_of_reference && frames.len() > 1);
+    let [width, height] = observations.size.map(|side| side as f32);
+    let spacing = (width * height / pixels[0].len() as f32).sqrt();
+    let tolerances = [config.coverage_tolerance * spacing, config.containment_tolerance];
+    let everything: Vec<u32> = (0..pixels[0].len() as u32).collect();
+    (first..frames.len())
+        .into_par_iter()
+        .filter_map(|f| {
+            let silhouette = observations.silhouettes[frames[f]].as_ref()?;
+            // Where nothing is seen, every point is called back.
+            let all = config.silhouette_of_hidden_points || visible[f].is_empty();
+            let visible = if all { &everything } else { &visible[f] };
+            let weights = match config.reduction {
+                Reduction::Sum => [1.0; 2],
+                Reduction::Mean => [silhouette.pixels.len(), visible.len()].map(|n| 1.0 / n as f32),
+            };
+            Some((f, silhouette_pairs(silhouette, &pixels[f], visible, weights, tolerances)))
+        })
+        .collect()
+}

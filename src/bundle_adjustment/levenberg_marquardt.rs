@@ -1,0 +1,210 @@
+//! Levenberg–Marquardt over all poses and the leading style directions.
+//!
+//! The paper sets Gauss–Newton aside because ∂X/∂s hides in the network. A batch of decoded
+//! neighbours gives it by differences: one row of the batch for each direction.
+
+use burn::tensor::{Tensor, TensorData};
+use nalgebra::{DVector, Isometry3};
+use serde::{Deserialize, Serialize};
+
+use super::{
+    Progress, Status,
+    linearisation::{Linearisation, NormalEquations},
+    objective::{Evaluation, Objective},
+    unknowns::Unknowns,
+};
+use crate::host::host_points;
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LevenbergMarquardtConfig {
+    /// Iterations at each level of blur.
+    pub iterations: usize,
+    /// Leading directions of the whitened style that are solved for.
+    pub n_directions: usize,
+    /// Points of one frame that enter the Jacobian at most.
+    pub max_residuals: usize,
+    /// Iterations at the first level during which p_0 and the style wait for the Δp_l.
+    pub relative_first: usize,
+    /// Stops at a level when an iteration lowers the objective by less than this share of it.
+    pub relative_tolerance: f64,
+}
+
+impl Default for LevenbergMarquardtConfig {
+    fn default() -> Self {
+        Self {
+            iterations: 10,
+            n_directions: 16,
+            max_residuals: 2000,
+            relative_first: 3,
+            relative_tolerance: 1e-4,
+        }
+    }
+}
+
+/// Damping at the start, its limits, and how it changes after a failure and a success.
+const DAMPING: f64 = 1e-2;
+const DAMPING_LIMITS: [f64; 2] = [1e-6, 1e4];
+const DAMPING_FACTORS: [f64; 2] = [6.0, 0.3];
+/// Step of the style for ∂X/∂s, in standard deviations.
+const STYLE_STEP: f32 = 0.05;
+/// Longest step of a rotation (radians), and of a style direction (standard deviations).
+const MAX_TURN: f64 = 0.2;
+const MAX_STYLE_STEP: f64 = 0.7;
+
+/// Runs at one level of blur. A step that does not lower the objective is never taken.
+pub fn run(
+    objective: &Objective,
+    unknowns: &mut Unknowns,
+    level: usize,
+    config: &LevenbergMarquardtConfig,
+    progress: &mut Progress,
+) -> Status {
+    let mut damping = DAMPING;
+    let mut current = objective.value(unknowns, level);
+    let mut shape = ShapeJacobian::default();
+    for iteration in 0..config.iterations {
+        progress.report("joint", &current, unknowns);
+        if !current.objective.is_finite() {
+            return Status::NotFinite;
+        }
+        let relative_only = level == 0 && iteration < config.relative_first;
+        let n_directions = config.n_directions.min(unknowns.style().len());
+        shape.refresh(objective, unknowns, n_directions);
+        let model = normal_equations(objective, unknowns, level, &shape, config);
+        let Some((next, value)) = damped_step(
+            objective,
+            unknowns,
+            level,
+            &model,
+            current.objective,
+            &mut damping,
+            relative_only,
+        ) else {
+            break;
+        };
+        let gain = current.objective - value.objective;
+        (*unknowns, current) = (next, value);
+        if !relative_only && gain <= config.relative_tolerance * current.objective {
+            break;
+        }
+    }
+    progress.report("joint", &current, unknowns);
+    Status::Converged
+}
+
+/// Raises the damping until a step lowers the objective; `None` when none does.
+fn damped_step(
+    objective: &Objective,
+    unknowns: &Unknowns,
+    level: usize,
+    model: &NormalEquations,
+    current: f64,
+    damping: &mut f64,
+    relative_only: bool,
+) -> Option<(Unknowns, Evaluation)> {
+    let n_directions = model.gradient.len() - 6 * unknowns.n_frames();
+    while *damping <= DAMPING_LIMITS[1] {
+        let mut hessian = model.hessian.clone();
+        for i in 0..hessian.nrows() {
+            let held = relative_only && i < 6 + n_directions;
+            hessian[(i, i)] += if held { 1e12 } else { *damping * hessian[(i, i)] + 1e-9 };
+        }
+        let step = hessian.cholesky().map(|cholesky| -cholesky.solve(&model.gradient));
+        let trial =
+            step.map(|step| unknowns.stepped(limited(step, n_directions).as_slice(), n_directions));
+        if let Some(trial) = trial {
+            let value = objective.value(&trial, level);
+            if value.objective < current {
+                *damping = (*damping * DAMPING_FACTORS[1]).max(DAMPING_LIMITS[0]);
+                return Some((trial, value));
+            }
+        }
+        *damping *= DAMPING_FACTORS[0];
+    }
+    *damping = DAMPING;
+    None
+}
+
+/// Shortens a step whose linear model can no longer be trusted.
+fn limited(step: DVector<f64>, n_directions: usize) -> DVector<f64> {
+    let style = 6..6 + n_directions;
+    let excess = step.iter().enumerate().map(|(i, value)| {
+        let of_translation =
+            !style.contains(&i) && (i - if i < 6 { 0 } else { n_directions }) % 6 >= 3;
+        match (style.contains(&i), of_translation) {
+            (true, _) => value.abs() / MAX_STYLE_STEP,
+            (_, true) => 0.0,
+            _ => value.abs() / MAX_TURN,
+        }
+    });
+    let excess = excess.fold(1.0, f64::max);
+    step / excess
+}
+
+fn normal_equations(
+    objective: &Objective,
+    unknowns: &Unknowns,
+    level: usize,
+    shape: &ShapeJacobian,
+    config: &LevenbergMarquardtConfig,
+) -> NormalEquations {
+    let poses: Vec<Isometry3<f64>> =
+        unknowns.camera_from_world(&objective.device).iter().map(|pose| pose.cast()).collect();
+    let matches = objective.correspondences(unknowns);
+    let linearisation = Linearisation {
+        observations: objective.observations,
+        config: objective.config,
+        level,
+        matches: &matches,
+        poses: &poses,
+        points: &shape.points,
+        style_derivatives: &shape.derivatives,
+        max_residuals: config.max_residuals,
+    };
+    let mut model = linearisation.normal_equations();
+    let style = &unknowns.values[unknowns.style()];
+    let weight = f64::from(objective.config.style_weight) / style.len().max(1) as f64;
+    for (i, &value) in style.iter().take(shape.derivatives.len()).enumerate() {
+        model.hessian[(6 + i, 6 + i)] += weight;
+        model.gradient[6 + i] += weight * value;
+    }
+    model
+}
+
+/// The cloud and ∂X/∂s, kept while the style stands still.
+#[derive(Default)]
+struct ShapeJacobian {
+    style: Vec<f64>,
+    points: Vec<[f32; 3]>,
+    derivatives: Vec<Vec<[f32; 3]>>,
+}
+
+impl ShapeJacobian {
+    fn refresh(&mut self, objective: &Objective, unknowns: &Unknowns, n_directions: usize) {
+        let style = &unknowns.values[unknowns.style()];
+        if !self.points.is_empty() && self.style == style {
+            return;
+        }
+        let device = objective.device.clone().inner();
+        let decode = |style: &[f64]| {
+            let style: Vec<f32> = style.iter().map(|&s| s as f32).collect();
+            let shape = [1, style.len()];
+            host_points(
+                &objective.shape.points(Tensor::from_data(TensorData::new(style, shape), &device)),
+            )
+        };
+        self.points = decode(style);
+        self.derivatives = (0..n_directions)
+            .map(|direction| {
+                let mut moved = style.to_vec();
+                moved[direction] += f64::from(STYLE_STEP);
+                let difference = |(a, b): (&[f32; 3], &[f32; 3])| {
+                    std::array::from_fn(|i| (a[i] - b[i]) / STYLE_STEP)
+                };
+                decode(&moved).iter().zip(&self.points).map(difference).collect()
+            })
+            .collect();
+        self.style = style.to_vec();
+    }
+}

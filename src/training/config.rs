@@ -1,0 +1,228 @@
+//! What a training run is: presets state what differs from these defaults.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{
+    Error, Result, data::viewpoint::ViewpointRange, regressor::RegressorConfig,
+    shape_prior::ShapePriorConfig,
+};
+
+/// A whole run: two runs of one config give the same weights.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrainingConfig {
+    pub seed: u64,
+    pub data: DataConfig,
+    pub prior: PriorStageConfig,
+    pub regressors: RegressorStageConfig,
+}
+
+/// The shapes, and the pictures of them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DataConfig {
+    /// Shapes to train on.
+    pub n_models: usize,
+    /// Shapes held out, to measure on.
+    pub n_validation: usize,
+    /// Points sampled from each surface, once.
+    pub points_per_model: usize,
+    /// Pictures of each training shape, and how many paints they are spread over.
+    pub views_per_model: usize,
+    pub paints_per_model: usize,
+    /// Pictures of each held-out shape.
+    pub views_per_validation: usize,
+    pub viewpoints: ViewpointRange,
+    /// A copy of ShapeNet (version 1 or 2); without it, shapes are procedural cars.
+    pub shapenet: Option<PathBuf>,
+    /// The category there; 02958343 are cars.
+    pub synset: String,
+    /// Which model ids to take (all, if empty) and which of these to leave; `*` is anything.
+    pub include: Vec<String>,
+    pub exclude: Vec<String>,
+}
+
+impl Default for DataConfig {
+    fn default() -> Self {
+        Self {
+            n_models: 1500,
+            n_validation: 60,
+            points_per_model: 24_576,
+            views_per_model: 24,
+            paints_per_model: 3,
+            views_per_validation: 8,
+            viewpoints: ViewpointRange::default(),
+            shapenet: None,
+            synset: "02958343".into(),
+            include: Vec::new(),
+            exclude: Vec::new(),
+        }
+    }
+}
+
+/// The autoencoder and its training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PriorStageConfig {
+    pub network: ShapePriorConfig,
+    pub schedule: Schedule,
+    /// Points of each cloud, and of its reconstruction, that look for their nearest neighbour.
+    pub chamfer_queries: usize,
+}
+
+impl Default for PriorStageConfig {
+    fn default() -> Self {
+        Self {
+            network: ShapePriorConfig::default(),
+            schedule: Schedule { steps: 4000, batch_size: 16, ..Schedule::default() },
+            chamfer_queries: 1536,
+        }
+    }
+}
+
+/// The regressors and their training.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RegressorStageConfig {
+    pub network: RegressorConfig,
+    pub schedule: Schedule,
+    /// How far, as a share of its extent, each side of the object's box is off in training.
+    pub box_jitter: f32,
+    /// Whether a mirrored shape is a shape: half of the pictures are then mirrored.
+    pub mirror: bool,
+    /// Standard deviations of each colour channel's gain, and of each pixel's noise.
+    pub gain_noise: f32,
+    pub pixel_noise: f32,
+}
+
+impl Default for RegressorStageConfig {
+    fn default() -> Self {
+        Self {
+            network: RegressorConfig::default(),
+            schedule: Schedule { steps: 8000, batch_size: 32, ..Schedule::default() },
+            box_jitter: 0.05,
+            mirror: true,
+            gain_noise: 0.15,
+            pixel_noise: 0.02,
+        }
+    }
+}
+
+/// How a stage goes down its loss: Adam, with a warm-up and a cosine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Schedule {
+    pub steps: usize,
+    pub batch_size: usize,
+    /// The highest learning rate, after `warm_up` steps; it ends at a hundredth of it.
+    pub learning_rate: f64,
+    pub warm_up: usize,
+    /// Steps between lines of metrics.jsonl, and between measurements on held-out shapes.
+    pub log_every: usize,
+    pub validate_every: usize,
+    /// Steps between checkpoints: what an interruption can cost.
+    pub checkpoint_every: usize,
+}
+
+impl Default for Schedule {
+    fn default() -> Self {
+        Self {
+            steps: 1000,
+            batch_size: 16,
+            learning_rate: 1e-3,
+            warm_up: 100,
+            log_every: 50,
+            validate_every: 1000,
+            checkpoint_every: 500,
+        }
+    }
+}
+
+impl Schedule {
+    /// The learning rate of a step, counted from zero.
+    pub fn learning_rate(&self, step: usize) -> f64 {
+        let warm_up = (step + 1) as f64 / self.warm_up.max(1) as f64;
+        let progress = step as f64 / self.steps.max(1) as f64;
+        let cosine = 0.5 * (1.0 + (std::f64::consts::PI * progress).cos());
+        self.learning_rate * warm_up.min(1.0) * (0.99 * cosine + 0.01)
+    }
+}
+
+impl TrainingConfig {
+    /// Reads a preset, and refuses what could not be trained.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = fs::read_to_string(path).map_err(Error::io(path))?;
+        Self::parse(&text, path)
+    }
+
+    /// The config in a text, which errors say is at `path`.
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
+        let invalid = |reason| Error::Config { path: path.into(), reason };
+        let config: Self = toml::from_str(text).map_err(|error| invalid(error.to_string()))?;
+        config.check().map_err(invalid)?;
+        Ok(config)
+    }
+
+    /// Why this cannot be trained, if it cannot.
+    pub fn check(&self) -> Result<(), String> {
+        self.prior.network.check()?;
+        self.regressors.network.check()?;
+        let data = &self.data;
+        let positive = [
+            ("n_models", data.n_models),
+            ("n_validation", data.n_validation),
+            ("views_per_model", data.views_per_model),
+            ("paints_per_model", data.paints_per_model),
+            ("views_per_validation", data.views_per_validation),
+            ("chamfer_queries", self.prior.chamfer_queries),
+            ("checkpoint_every", self.prior.schedule.checkpoint_every),
+            ("checkpoint_every", self.regressors.schedule.checkpoint_every),
+            ("log_every", self.prior.schedule.log_every),
+            ("log_every", self.regressors.schedule.log_every),
+            ("validate_every", self.prior.schedule.validate_every),
+            ("validate_every", self.regressors.schedule.validate_every),
+        ];
+        if let Some((name, _)) = positive.iter().find(|(_, value)| *value == 0) {
+            return Err(format!("{name} must be positive"));
+        }
+        // Batch normalisation needs a batch.
+        if self.prior.schedule.batch_size.min(self.regressors.schedule.batch_size) < 2 {
+            return Err("batch_size must be at least 2".into());
+        }
+        let n_points = self.prior.network.n_points().max(self.prior.network.n_encoder_points);
+        if data.points_per_model < n_points {
+            return Err(format!("points_per_model must be at least {n_points}"));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_learning_rate_rises_then_falls_to_a_hundredth() {
+        let schedule = Schedule { steps: 1000, warm_up: 100, ..Schedule::default() };
+        assert!(schedule.learning_rate(0) < 0.02 * schedule.learning_rate);
+        assert!(schedule.learning_rate(100) > 0.95 * schedule.learning_rate);
+        assert!(schedule.learning_rate(999) < 0.011 * schedule.learning_rate);
+    }
+
+    #[test]
+    fn the_defaults_can_be_trained() {
+        assert_eq!(TrainingConfig::default().check(), Ok(()));
+    }
+
+    #[test]
+    fn a_batch_of_one_cannot_be_normalised() {
+        let mut config = TrainingConfig::default();
+        config.prior.schedule.batch_size = 1;
+        assert!(config.check().is_err());
+    }
+}

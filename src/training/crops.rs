@@ -1,0 +1,165 @@
+//! Pictures to train the regressors on: crops rendered straight through their virtual cameras.
+
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
+use rand::Rng;
+use rayon::prelude::*;
+
+use super::{TrainingConfig, batches::normal, shapes::Shapes};
+use crate::{
+    Result,
+    data::{
+        crop::{CropCamera, jitter},
+        keyed_rng,
+        lighting::Scene,
+        rasteriser::Renderer,
+        viewpoint::{Viewpoint, projected_box},
+    },
+    regressor::crop_values,
+};
+
+/// The random stream of a picture: the first half of its key, with the number of the view.
+const VIEW: u64 = 21 << 32;
+/// Side of the pictures, in pixels, that crops are cut from; only its ratio to the box matters.
+const PICTURE: usize = 128;
+
+/// A crop, how its camera was placed, and what it shows.
+pub(super) struct Crop {
+    /// `[size, size, 4]`: red, green, blue and mask, as bytes.
+    pub pixels: Vec<u8>,
+    pub crop_from_world: Isometry3<f32>,
+    /// The focal length in units of the crop's side.
+    pub focal_ratio: f32,
+    /// Which of the shapes that were asked for.
+    pub shape_idx: usize,
+}
+
+/// Renders `n_views` of each shape, spread over its paints.
+pub(super) fn render_crops(
+    config: &TrainingConfig,
+    shapes: &Shapes,
+    models: &[usize],
+    n_views: usize,
+    progress: impl Fn() + Sync,
+) -> Result<Vec<Crop>> {
+    let paints = config.data.paints_per_model.min(n_views);
+    let crops: Result<Vec<Vec<Crop>>> = models
+        .par_iter()
+        .enumerate()
+        .map(|(shape_idx, &model_idx)| {
+            let mut crops = Vec::with_capacity(n_views);
+            for paint in 0..paints {
+                let mesh = shapes.mesh(model_idx, paint)?;
+                let renderer = Renderer::new(&mesh);
+                for view in (paint..n_views).step_by(paints) {
+                    let mut rng = keyed_rng(config.seed, [VIEW + view as u64, model_idx as u64]);
+                    crops.extend(render_crop(
+                        config,
+                        &mesh.vertices,
+                        &renderer,
+                        shape_idx,
+                        &mut rng,
+                    ));
+                }
+            }
+            progress();
+            Ok(crops)
+        })
+        .collect();
+    Ok(crops?.into_iter().flatten().collect())
+}
+
+impl Crop {
+    /// What the network sees, as in a training step: perhaps mirrored, in other light, and noisy.
+    pub fn augmented(&self, config: &TrainingConfig, rng: &mut impl Rng) -> (Vec<f32>, Self) {
+        let regressors = &config.regressors;
+        let gains: [f32; 3] = std::array::from_fn(|_| 1.0 + regressors.gain_noise * normal(rng));
+        let mut values = self.values();
+        for pixel in values.as_chunks_mut::<4>().0 {
+            let mask = pixel[3];
+            for (channel, gain) in pixel.iter_mut().zip(gains) {
+                let noisy = *channel * gain + mask * regressors.pixel_noise * normal(rng);
+                *channel = noisy.clamp(0.0, 1.0);
+            }
+        }
+        let mut truth = Self { pixels: Vec::new(), ..*self };
+        if regressors.mirror && rng.random() {
+            mirror_columns(&mut values, regressors.network.crop_size);
+            truth.crop_from_world = mirrored(&self.crop_from_world);
+        }
+        (values, truth)
+    }
+
+    /// What the network sees, untouched.
+    pub fn values(&self) -> Vec<f32> {
+        self.pixels.iter().map(|&byte| f32::from(byte) / 255.0).collect()
+    }
+}
+
+/// One crop; `None` where the object came to lie behind the camera, which viewpoints exclude.
+fn render_crop(
+    config: &TrainingConfig,
+    vertices: &[Point3<f32>],
+    renderer: &Renderer,
+    shape_idx: usize,
+    rng: &mut impl Rng,
+) -> Option<Crop> {
+    let network = &config.regressors.network;
+    let view = Viewpoint::random(vertices, [PICTURE; 2], &config.data.viewpoints, rng);
+    let object = projected_box(vertices, &view.camera_from_world, &view.intrinsics)?;
+    let object = jitter(object, config.regressors.box_jitter, rng);
+    let size = network.crop_size;
+    let camera = CropCamera::around(object, &view.intrinsics, size, network.crop_margin);
+    let crop_from_world = camera.crop_from_world(&view.camera_from_world);
+
+    let scene = Scene::random(rng, None);
+    let picture = renderer.render(&scene, &crop_from_world, &camera.intrinsics, [size; 2]);
+    let values = crop_values(&picture.color, &picture.coverage);
+    Some(Crop {
+        pixels: values.into_iter().map(|value| (value * 255.0).round() as u8).collect(),
+        crop_from_world,
+        focal_ratio: camera.intrinsics.focal[0] / size as f32,
+        shape_idx,
+    })
+}
+
+/// F R F and F t, where F flips x: the pose at which the mirrored shape looks mirrored.
+fn mirrored(pose: &Isometry3<f32>) -> Isometry3<f32> {
+    let flip = Matrix3::from_diagonal(&[-1.0, 1.0, 1.0].into());
+    let rotation = flip * pose.rotation.to_rotation_matrix().matrix() * flip;
+    let rotation = Rotation3::from_matrix_unchecked(rotation);
+    let translation = Translation3::from(flip * pose.translation.vector);
+    Isometry3::from_parts(translation, UnitQuaternion::from_rotation_matrix(&rotation))
+}
+
+fn mirror_columns(values: &mut [f32], size: usize) {
+    for row in values.chunks_mut(4 * size) {
+        row.as_chunks_mut::<4>().0.reverse();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Intrinsics;
+    use crate::data::viewpoint::{orbit_rotation, project};
+
+    #[test]
+    fn a_mirrored_pose_shows_the_mirrored_point_in_the_mirrored_column() {
+        let pose = Isometry3::from_parts(
+            Translation3::new(0.1, -0.05, 2.0),
+            orbit_rotation(0.7, 0.3, 0.1),
+        );
+        let camera = Intrinsics { focal: [50.0; 2], center: [32.0; 2] };
+        let (point, mirror_point) = (Point3::new(0.2, 0.1, -0.3), Point3::new(-0.2, 0.1, -0.3));
+        let [u, v] = project(&(pose * point), &camera);
+        let [mirror_u, mirror_v] = project(&(mirrored(&pose) * mirror_point), &camera);
+        assert!((mirror_u - (64.0 - u)).abs() < 1e-4 && (mirror_v - v).abs() < 1e-4);
+    }
+
+    #[test]
+    fn mirroring_reverses_the_pixels_of_each_row() {
+        let mut values: Vec<f32> = (0..16).map(|i| i as f32).collect();
+        mirror_columns(&mut values, 2);
+        assert_eq!(values, [4., 5., 6., 7., 0., 1., 2., 3., 12., 13., 14., 15., 8., 9., 10., 11.]);
+    }
+}

@@ -1,0 +1,155 @@
+//! Training runs as a whole, on the tiny preset.
+
+use std::{
+    fs,
+    path::Path,
+    process::Command,
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use burn::tensor::{Device, Tensor};
+use object_pba::{
+    chamfer::chamfer_distance,
+    checkpoint::{Prior, REGRESSORS_FILE, SHAPE_FILE},
+    device::Backend,
+    host::host_values,
+    training::{TrainingConfig, train_regressors, train_shape_prior},
+};
+use serde_json::Value;
+use tempfile::TempDir;
+
+const TINY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/tiny.toml");
+
+fn tiny() -> TrainingConfig {
+    TrainingConfig::read(Path::new(TINY)).unwrap()
+}
+
+fn train(config: &TrainingConfig, backend: Backend) -> TempDir {
+    let out = tempfile::tempdir().unwrap();
+    train_shape_prior(config, out.path(), &backend.device()).unwrap();
+    train_regressors(config, out.path(), &backend.device()).unwrap();
+    out
+}
+
+fn weights(out: &Path) -> [Vec<u8>; 2] {
+    [SHAPE_FILE, REGRESSORS_FILE].map(|file| fs::read(out.join(file)).unwrap())
+}
+
+/// A quantity of a stage, over its logged steps.
+fn history(out: &Path, stage: &str, name: &str) -> Vec<f64> {
+    let text = fs::read_to_string(out.join("metrics.jsonl")).unwrap();
+    let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    lines.filter(|line| line["stage"] == stage).filter_map(|line| line[name].as_f64()).collect()
+}
+
+#[track_caller]
+fn check_falls(losses: &[f64]) {
+    let half = losses.len() / 2;
+    let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
+    let (early, late) = (mean(&losses[..half]), mean(&losses[half..]));
+    assert!(late < 0.9 * early, "{losses:?}");
+}
+
+#[track_caller]
+fn check_learns(backend: Backend) {
+    let out = train(&tiny(), backend);
+    check_falls(&history(out.path(), "prior", "chamfer"));
+    check_falls(&history(out.path(), "regressors", "pose"));
+}
+
+#[test]
+fn flex_learns() {
+    check_learns(Backend::Flex);
+}
+
+#[test]
+fn ndarray_learns() {
+    check_learns(Backend::Ndarray);
+}
+
+#[test]
+fn one_seed_gives_the_same_weights_and_another_does_not() {
+    let [one, same] = [tiny(), tiny()].map(|config| train(&config, Backend::Flex));
+    let other = train(&TrainingConfig { seed: 2, ..tiny() }, Backend::Flex);
+    let [one, same, other] = [one, same, other].map(|out| weights(out.path()));
+    assert!(one == same);
+    assert!(one[0] != other[0] && one[1] != other[1]);
+}
+
+#[test]
+fn an_interrupted_run_goes_on_to_the_same_weights() {
+    let out = tempfile::tempdir().unwrap();
+    let command = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_pba-train"));
+        command.args(["all", "--config", TINY, "--out"]).arg(out.path());
+        command
+    };
+    for (checkpoint, weights) in
+        [("prior.checkpoint", SHAPE_FILE), ("regressors.checkpoint", REGRESSORS_FILE)]
+    {
+        let mut run = command().spawn().unwrap();
+        let start = Instant::now();
+        while !out.path().join(checkpoint).exists() && start.elapsed() < Duration::from_secs(60) {
+            sleep(Duration::from_millis(1));
+        }
+        run.kill().unwrap();
+        run.wait().unwrap();
+        assert!(out.path().join(checkpoint).exists(), "the run was not interrupted");
+        assert!(!out.path().join(weights).exists(), "the run was not interrupted");
+    }
+    assert!(command().status().unwrap().success());
+
+    let uninterrupted = train(&tiny(), Backend::Flex);
+    assert!(weights(out.path()) == weights(uninterrupted.path()));
+    for stage in ["prior", "regressors"] {
+        let steps = history(out.path(), stage, "step");
+        assert_eq!(steps, history(uninterrupted.path(), stage, "step"));
+    }
+}
+
+#[test]
+fn styles_do_not_collapse_to_the_mean_shape() {
+    let device = Device::flex();
+    let out = train(&tiny(), Backend::Flex);
+    let prior = Prior::load(out.path(), &device).unwrap();
+    let generator = &prior.shape.generator;
+    let mean = Tensor::zeros([1, generator.n_style()], &device);
+    let mut off_mean = vec![0.0; generator.n_style()];
+    off_mean[0] = 2.0;
+    let off_mean = Tensor::<1>::from_floats(off_mean.as_slice(), &device).unsqueeze();
+
+    let distance = chamfer_distance(generator.forward(mean), generator.forward(off_mean));
+    // Squared world units: points move by more than 3 mm of a car of one metre.
+    let distance = host_values(&distance)[0];
+    assert!(distance > 1e-5, "{distance}");
+}
+
+#[test]
+fn a_finished_run_is_left_alone_and_another_config_refused() {
+    let out = train(&tiny(), Backend::Flex);
+    let before = weights(out.path());
+    train_shape_prior(&tiny(), out.path(), &Device::flex()).unwrap();
+    assert!(weights(out.path()) == before);
+
+    let other = TrainingConfig { seed: 2, ..tiny() };
+    let error = train_shape_prior(&other, out.path(), &Device::flex()).unwrap_err();
+    assert!(error.to_string().contains("another config"));
+}
+
+#[test]
+fn what_cannot_be_trained_is_one_line_on_stderr() {
+    let folder = tempfile::tempdir().unwrap();
+    let broken = folder.path().join("broken.toml");
+    fs::write(&broken, "[data]\nmodels = 3\n").unwrap();
+    for config in [broken.clone(), folder.path().join("missing.toml")] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_pba-train"));
+        let out = folder.path().join("out");
+        command.arg("prior").arg("--config").arg(&config).arg("--out").arg(&out);
+        let output = command.output().unwrap();
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success());
+        assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+        assert!(message.contains(config.to_str().unwrap()), "{message}");
+    }
+}
