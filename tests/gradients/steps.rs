@@ -105,7 +105,7 @@ fn silhouette_distances_to_points() {
     let distances = |pixels: Tensor<1>| {
         let pixels = pixels.reshape([2, 20, 2]);
         let of_frame = |(row, projected): (usize, &Vec<[f32; 2]>)| {
-            (row, silhouette_pairs(&silhouette, projected, &everything, [0.3, 0.7], 0.0))
+            (row, silhouette_pairs(&silhouette, projected, &everything, [0.3, 0.7], tolerances))
         };
         let pairs: Vec<_> = host_pixels(&pixels).iter().enumerate().map(of_frame).collect();
         silhouette_distances(pixels, &pairs)
