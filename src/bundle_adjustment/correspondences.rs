@@ -67,8 +67,8 @@ fn comparable(
     visible[target].iter().for_each(|&i| hidden[i as usize] = false);
     let may = |i: usize| {
         let inside = !config.within_masks
-            || (observations.in_mask(frames[0], pixels[reference][i])
-                && observations.in_mask(frames[1], pixels[target][i]));
+            || (observations.shows_object(frames[0], pixels[reference][i])
+                && observations.shows_object(frames[1], pixels[target][i]));
         inside && !hidden[i]
     };
     visible[reference].iter().map(|&i| if may(i as usize) { 1.0 } else { 0.0 }).collect()

@@ -48,6 +48,8 @@ const DAMPING_LIMITS: [f64; 2] = [1e-6, 1e4];
 const DAMPING_FACTORS: [f64; 2] = [6.0, 0.3];
 /// Step of the style for ∂X/∂s, in standard deviations.
 const STYLE_STEP: f32 = 0.05;
+/// How far any direction may be from where ∂X/∂s was taken, in standard deviations.
+const STYLE_TOLERANCE: f32 = 0.2;
 /// Longest step of a rotation (radians), and of a style direction (standard deviations).
 const MAX_TURN: f64 = 0.2;
 const MAX_STYLE_STEP: f64 = 0.7;
@@ -172,39 +174,37 @@ fn normal_equations(
     model
 }
 
-/// The cloud and ∂X/∂s, kept while the style stands still.
+/// The cloud, and ∂X/∂s at a style nearby.
 #[derive(Default)]
 struct ShapeJacobian {
-    style: Vec<f64>,
+    /// Where the derivatives were taken.
+    style: Vec<f32>,
     points: Vec<[f32; 3]>,
     derivatives: Vec<Vec<[f32; 3]>>,
 }
 
 impl ShapeJacobian {
+    /// Decodes the cloud; the derivatives, too, when the style has moved on.
     fn refresh(&mut self, objective: &Objective, unknowns: &Unknowns, n_directions: usize) {
-        let style = &unknowns.values[unknowns.style()];
-        if !self.points.is_empty() && self.style == style {
-            return;
-        }
+        let style: Vec<f32> = unknowns.values[unknowns.style()].iter().map(|&s| s as f32).collect();
+        let moved = style.iter().zip(&self.style).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        let n_moved =
+            if self.points.is_empty() || moved > STYLE_TOLERANCE { n_directions } else { 0 };
+        // The style itself, then a row for each direction.
+        let mut rows = style.repeat(1 + n_moved);
+        (0..n_moved).for_each(|i| rows[(1 + i) * style.len() + i] += STYLE_STEP);
+        let rows = TensorData::new(rows, [1 + n_moved, style.len()]);
         let device = objective.device.clone().inner();
-        let decode = |style: &[f64]| {
-            let style: Vec<f32> = style.iter().map(|&s| s as f32).collect();
-            let shape = [1, style.len()];
-            host_points(
-                &objective.shape.points(Tensor::from_data(TensorData::new(style, shape), &device)),
-            )
-        };
-        self.points = decode(style);
-        self.derivatives = (0..n_directions)
-            .map(|direction| {
-                let mut moved = style.to_vec();
-                moved[direction] += f64::from(STYLE_STEP);
-                let difference = |(a, b): (&[f32; 3], &[f32; 3])| {
-                    std::array::from_fn(|i| (a[i] - b[i]) / STYLE_STEP)
-                };
-                decode(&moved).iter().zip(&self.points).map(difference).collect()
-            })
-            .collect();
-        self.style = style.to_vec();
+        let clouds = host_points(&objective.shape.points(Tensor::from_data(rows, &device)));
+        let (points, moved) = clouds.split_at(clouds.len() / (1 + n_moved));
+        self.points = points.to_vec();
+        if n_moved > 0 {
+            let slope = |(a, b): (&[f32; 3], &[f32; 3])| {
+                std::array::from_fn(|i| (a[i] - b[i]) / STYLE_STEP)
+            };
+            let derivative = |cloud: &[[f32; 3]]| cloud.iter().zip(points).map(slope).collect();
+            self.derivatives = moved.chunks(points.len()).map(derivative).collect();
+            self.style = style;
+        }
     }
 }

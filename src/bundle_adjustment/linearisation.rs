@@ -52,10 +52,10 @@ impl Linearisation<'_> {
             .into_par_iter()
             .map(|frame| {
                 let rows = self.rows(frame);
-                let jacobian =
-                    DMatrix::from_row_slice(rows.residuals.len(), 12 + k, &rows.jacobian);
                 let residuals = DVector::from_vec(rows.residuals);
-                (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&residuals))
+                // Rows of J one after the other are the columns of Jᵀ.
+                let transposed = DMatrix::from_vec(12 + k, residuals.len(), rows.jacobian);
+                (&transposed * transposed.transpose(), transposed * residuals)
             })
             .collect();
 

@@ -1,14 +1,23 @@
 //! The pictures, in the forms that the losses ask for.
 
 use burn::tensor::Device;
+use image::{Rgb, imageops::blur};
 use rayon::prelude::*;
 
 use crate::{
     camera::Intrinsics,
-    data::{ColorImage, ScalarImage, sequence::Sequence},
-    loss::{MASK_THRESHOLD, Silhouette},
+    data::{
+        ColorImage, ScalarImage,
+        sequence::{Frame, Sequence},
+    },
+    loss::Silhouette,
     sampling::ImageTable,
 };
+
+/// Coverage from which on a pixel holds nothing of the background.
+const COVERED: f32 = 0.9;
+/// Share of a Gaussian that must fall on the object for a blurred colour to be the object's.
+const LEAST_SHARE: f32 = 0.05;
 
 /// A sequence, ready to be compared with any shape from any poses.
 pub struct Observations {
@@ -20,19 +29,18 @@ pub struct Observations {
     /// The same on the host.
     pub(super) host_images: Vec<Vec<ColorImage>>,
     pub(super) silhouettes: Vec<Option<Silhouette>>,
-    masks: Vec<ScalarImage>,
+    /// For each frame, whether a pixel and its neighbours hold nothing of the background.
+    interiors: Vec<Vec<bool>>,
 }
 
 impl Observations {
     /// One level for each of `blurs`, a Gaussian's standard deviation in pixels (0 leaves the
     /// frames as they are). Masks stay sharp.
     pub fn new(sequence: &Sequence, blurs: &[f32], device: &Device) -> Self {
-        let level = |&blur: &f32| {
-            let blurred = |image: &ColorImage| match blur > 0.0 {
-                true => image::imageops::blur(image, blur),
-                false => image.clone(),
-            };
-            sequence.frames.par_iter().map(|f| blurred(&f.color)).collect()
+        let frames = &sequence.frames;
+        let level = |&blur: &f32| match blur > 0.0 {
+            true => frames.par_iter().map(|frame| blurred_object(frame, blur)).collect(),
+            false => frames.iter().map(|frame| frame.color.clone()).collect(),
         };
         let host_images: Vec<Vec<ColorImage>> = blurs.iter().map(level).collect();
         Self {
@@ -40,14 +48,81 @@ impl Observations {
             size: sequence.size,
             images: host_images.iter().map(|level| ImageTable::new(level, device)).collect(),
             host_images,
-            silhouettes: sequence.frames.iter().map(|f| Silhouette::new(&f.mask)).collect(),
-            masks: sequence.frames.iter().map(|frame| frame.mask.clone()).collect(),
+            silhouettes: frames.iter().map(|frame| Silhouette::new(&frame.mask)).collect(),
+            interiors: frames.iter().map(|frame| interior(&frame.mask)).collect(),
         }
     }
 
-    /// Whether a location of a frame shows the object.
-    pub(super) fn in_mask(&self, frame: usize, [u, v]: [f32; 2]) -> bool {
+    /// Whether a location of a frame shows the object and nothing else.
+    pub(super) fn shows_object(&self, frame: usize, [u, v]: [f32; 2]) -> bool {
         let inside = u >= 0.0 && v >= 0.0 && u < self.size[0] as f32 && v < self.size[1] as f32;
-        inside && self.masks[frame].get_pixel(u as u32, v as u32)[0] > MASK_THRESHOLD
+        inside && self.interiors[frame][v as usize * self.size[0] + u as usize]
+    }
+}
+
+/// A blur that keeps the background out of the object: blur(M I) / blur(M).
+///
+/// A plain one lets the background bleed into the outline, which then moves with the estimate.
+fn blurred_object(frame: &Frame, sigma: f32) -> ColorImage {
+    let (width, height) = frame.color.dimensions();
+    let coverage = |u, v| frame.mask.get_pixel(u, v)[0];
+    let object = ColorImage::from_fn(width, height, |u, v| {
+        Rgb(frame.color.get_pixel(u, v).0.map(|channel| channel * coverage(u, v)))
+    });
+    let share = ColorImage::from_fn(width, height, |u, v| Rgb([coverage(u, v); 3]));
+    let (object, share) = (blur(&object, sigma), blur(&share, sigma));
+    ColorImage::from_fn(width, height, |u, v| {
+        let share = share.get_pixel(u, v)[0];
+        match share > LEAST_SHARE {
+            true => Rgb(object.get_pixel(u, v).0.map(|channel| channel / share)),
+            false => *frame.color.get_pixel(u, v),
+        }
+    })
+}
+
+/// The mask, eroded by a pixel: bilinear colours there are made of the object's pixels only.
+fn interior(mask: &ScalarImage) -> Vec<bool> {
+    let covered = |u: i64, v: i64| {
+        let inside =
+            u >= 0 && v >= 0 && u < i64::from(mask.width()) && v < i64::from(mask.height());
+        // Beyond the frame nothing is known, and nothing speaks against.
+        !inside || mask.get_pixel(u as u32, v as u32)[0] >= COVERED
+    };
+    let around = |u: i64, v: i64| (-1..=1).all(|dv| (-1..=1).all(|du| covered(u + du, v + dv)));
+    mask.enumerate_pixels().map(|(u, v, _)| around(i64::from(u), i64::from(v))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Luma;
+
+    /// A grey disc on a red ground.
+    fn frame() -> Frame {
+        let inside = |u: u32, v: u32| (u as f32 - 15.5).hypot(v as f32 - 15.5) < 9.0;
+        Frame {
+            path: "disc.png".into(),
+            color: ColorImage::from_fn(32, 32, |u, v| {
+                Rgb(if inside(u, v) { [0.5; 3] } else { [1.0, 0.0, 0.0] })
+            }),
+            mask: ScalarImage::from_fn(32, 32, |u, v| Luma([f32::from(u8::from(inside(u, v)))])),
+        }
+    }
+
+    #[test]
+    fn a_blurred_object_keeps_its_color_up_to_its_outline() {
+        let frame = frame();
+        let blurred = blurred_object(&frame, 2.0);
+        for (u, v, coverage) in frame.mask.enumerate_pixels().filter(|(_, _, m)| m[0] > 0.5) {
+            let color = blurred.get_pixel(u, v).0;
+            assert!(color.iter().all(|c| (c - 0.5).abs() < 1e-3), "{color:?} {coverage:?}");
+        }
+    }
+
+    #[test]
+    fn the_interior_is_the_mask_without_its_rim() {
+        let mask = ScalarImage::from_fn(5, 4, |u, _| Luma([if u >= 2 { 1.0 } else { 0.0 }]));
+        let row = [false, false, false, true, true];
+        assert_eq!(interior(&mask), row.repeat(4));
     }
 }

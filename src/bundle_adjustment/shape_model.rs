@@ -6,7 +6,7 @@ use crate::shape_prior::Generator;
 
 /// A cloud as a differentiable function of a vector.
 pub trait ShapeModel: Sync {
-    /// `[1, k]` to the cloud `[1, n, 3]`, in the world frame.
+    /// `[b, k]` to b clouds `[b, n, 3]`, in the world frame.
     fn points(&self, style: Tensor<2>) -> Tensor<3>;
 }
 
@@ -17,12 +17,13 @@ impl ShapeModel for Generator {
     }
 }
 
-/// No prior (Fig. 7): the unknowns are the points themselves, `[1, 3n]`.
+/// No prior (Fig. 7): the unknowns are the points themselves, `[b, 3n]`.
 pub struct FreePoints;
 
 impl ShapeModel for FreePoints {
     fn points(&self, style: Tensor<2>) -> Tensor<3> {
-        style.reshape([1, -1, 3])
+        let [b, _] = style.dims();
+        style.reshape([b as i64, -1, 3])
     }
 }
 

@@ -117,8 +117,7 @@ impl Regressors {
         let device = self.style.device();
         let shape = [1, self.crop_size, self.crop_size, 4];
         let crop = Tensor::from_data(TensorData::new(crop_values(color, mask), shape), &device);
-        let [focal_ratio] = [camera.intrinsics.focal[0] / self.crop_size as f32];
-
+        let focal_ratio = camera.intrinsics.focal[0] / self.crop_size as f32;
         let (style, pose) = self.forward(crop, Tensor::from_floats([[focal_ratio]], &device));
         Guess {
             style: host_values(&style),

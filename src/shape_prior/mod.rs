@@ -69,6 +69,9 @@ impl ShapePriorConfig {
         if sizes.iter().chain(&self.encoder_widths).any(|&size| size == 0) {
             return Err("the sizes of the shape prior must be positive".into());
         }
+        if n_encoder_points > self.n_points() {
+            return Err(format!("n_encoder_points must be at most {}", self.n_points()));
+        }
         let doublings = self.grid_side / COARSEST_SIDE;
         if !self.grid_side.is_multiple_of(COARSEST_SIDE) || !doublings.is_power_of_two() {
             return Err(format!("grid_side is {}, not 4, 8, 16, 32, …", self.grid_side));

@@ -194,7 +194,7 @@ impl TrainingConfig {
         if self.prior.schedule.batch_size.min(self.regressors.schedule.batch_size) < 2 {
             return Err("batch_size must be at least 2".into());
         }
-        let n_points = self.prior.network.n_points().max(self.prior.network.n_encoder_points);
+        let n_points = self.prior.network.n_points();
         if data.points_per_model < n_points {
             return Err(format!("points_per_model must be at least {n_points}"));
         }

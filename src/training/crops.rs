@@ -74,7 +74,7 @@ impl Crop {
         let regressors = &config.regressors;
         let gains: [f32; 3] = std::array::from_fn(|_| 1.0 + regressors.gain_noise * normal(rng));
         let mut values = self.values();
-        for pixel in values.as_chunks_mut::<4>().0 {
+        for pixel in values.as_chunks_mut::<4>().0.iter_mut().filter(|pixel| pixel[3] > 0.0) {
             let mask = pixel[3];
             for (channel, gain) in pixel.iter_mut().zip(gains) {
                 let noisy = *channel * gain + mask * regressors.pixel_noise * normal(rng);

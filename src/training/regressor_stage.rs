@@ -8,6 +8,7 @@ use burn::{
 };
 use indicatif::ProgressBar;
 use rand::Rng;
+use rayon::prelude::*;
 
 use super::{
     TrainingConfig,
@@ -110,9 +111,10 @@ impl<'a> RegressorStage<'a> {
         deviations: Tensor<1>,
         device: &Device,
     ) -> Terms {
-        let mut rng = keyed_rng(self.config.seed, [BATCH, step as u64]);
         let (values, truths): (Vec<_>, Vec<_>) = (0..self.config.regressors.schedule.batch_size)
-            .map(|_| {
+            .into_par_iter()
+            .map(|i| {
+                let mut rng = keyed_rng(self.config.seed, [BATCH + i as u64, step as u64]);
                 let crop = &self.training.crops[rng.random_range(0..self.training.crops.len())];
                 crop.augmented(self.config, &mut rng)
             })

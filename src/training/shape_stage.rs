@@ -113,7 +113,7 @@ impl<'a> ShapeStage<'a> {
             .map(|_| {
                 let surface = &self.training[rng.random_range(0..self.training.len())];
                 let target = surface.draw(network.n_points(), &mut rng);
-                (target[..network.n_encoder_points.min(target.len())].to_vec(), target)
+                (target[..network.n_encoder_points].to_vec(), target)
             })
             .unzip();
         let latent = prior.encode(cloud_tensor(&seen, device));

@@ -24,7 +24,6 @@ const N_ANCHORS: usize = 16;
 const ANCHOR_ELEVATION: f32 = 0.35;
 /// Radians within which two anchors mean one pose.
 const SAME_POSE: f32 = 0.5;
-
 /// An object's depth in focal lengths of the crop, where its diagonal of 1 just fits.
 const TYPICAL_DEPTH: f32 = 1.1;
 
