@@ -1,7 +1,7 @@
 //! The pseudo-renderer (Eq. 2) against what can truly be seen of the surface that points lie on.
 
 use burn::tensor::{Tensor, TensorData};
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Point3;
 use object_pba::{
     camera::{Intrinsics, Pose},
     data::{

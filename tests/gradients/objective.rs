@@ -38,7 +38,7 @@ fn sequence() -> Sequence {
             let radius = (u as f32 - 23.0 - l).hypot(v as f32 - 20.0);
             Luma([f32::from(radius < 12.0 + 0.5 * l)])
         });
-        Frame { color, mask }
+        Frame { color, mask, path: Default::default() }
     };
     Sequence {
         name: "waves".into(),
@@ -109,6 +109,7 @@ fn the_objective_of_poses_and_style() {
     let config = ShapePriorConfig {
         n_latent: 5,
         encoder_widths: [4; 3],
+        n_encoder_points: 16,
         n_fc_points: 48,
         fc_width: 16,
         grid_side: 4,
@@ -123,14 +124,17 @@ fn the_objective_of_poses_and_style() {
 #[test]
 fn points_that_no_frame_sees_have_no_gradient() {
     for paper_or_ours in [ObjectiveConfig::paper(), ObjectiveConfig::default()] {
-        let config = ObjectiveConfig { style_weight: 0.0, ..paper_or_ours };
+        // Without the pull of the style prior, and of silhouettes on points that lie hidden inside them.
+        let (style_weight, silhouette_of_hidden_points) = (0.0, false);
+        let config = ObjectiveConfig { style_weight, silhouette_of_hidden_points, ..paper_or_ours };
         let unknowns = unknowns(&two_sheets(), 2.0, &config);
         let gradient = evaluate(&FreePoints, &unknowns, &config).gradient;
         let seen = seen_by_any_frame(&unknowns, &config);
         assert!(seen.contains(&true) && seen.contains(&false));
-        for (gradient, seen) in gradient[unknowns.style()].chunks(3).zip(seen) {
-            assert_eq!(gradient != [0.0; 3], seen, "{gradient:?}");
-        }
+        let moved = gradient[unknowns.style()].chunks(3).map(|gradient| gradient != [0.0; 3]);
+        let of_seen: Vec<bool> =
+            moved.zip(seen).filter_map(|(m, seen)| m.then_some(seen)).collect();
+        assert!(!of_seen.is_empty() && !of_seen.contains(&false), "{of_seen:?}");
     }
 }
 

@@ -102,15 +102,17 @@ fn silhouette_distances_to_points() {
     let silhouette = Silhouette::new(&disc).expect("a disc");
     let pixels: Vec<f64> = scattered(2 * 2 * 20, 4).iter().map(|x| 14.0 + 12.0 * x).collect();
     let everything: Vec<u32> = (0..20).collect();
-    let distances = |pixels: Tensor<1>| {
-        let pixels = pixels.reshape([2, 20, 2]);
-        let of_frame = |(row, projected): (usize, &Vec<[f32; 2]>)| {
-            (row, silhouette_pairs(&silhouette, projected, &everything, [0.3, 0.7], tolerances))
+    for tolerances in [[0.0; 2], [0.9, 0.6]] {
+        let distances = |pixels: Tensor<1>| {
+            let pixels = pixels.reshape([2, 20, 2]);
+            let of_frame = |(row, projected): (usize, &Vec<[f32; 2]>)| {
+                (row, silhouette_pairs(&silhouette, projected, &everything, [0.3, 0.7], tolerances))
+            };
+            let pairs: Vec<_> = host_pixels(&pixels).iter().enumerate().map(of_frame).collect();
+            silhouette_distances(pixels, &pairs)
         };
-        let pairs: Vec<_> = host_pixels(&pixels).iter().enumerate().map(of_frame).collect();
-        silhouette_distances(pixels, &pairs)
-    };
-    check_gradient(&pixels, on_graph(distances));
+        check_gradient(&pixels, on_graph(distances));
+    }
 }
 
 #[test]
@@ -129,6 +131,7 @@ fn distances_of_generated_points_to_a_cloud() {
     let config = ShapePriorConfig {
         n_latent: 5,
         encoder_widths: [4; 3],
+        n_encoder_points: 16,
         n_fc_points: 24,
         fc_width: 16,
         grid_side: 8,
