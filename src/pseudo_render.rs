@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::camera::{NEAR, Projection};
 
+/// Bound on [`nearness`].
+const MAX_NEARNESS: f32 = 4.0;
+
 /// How coarse the plane is, and how far behind the nearest point another still counts as seen.
 ///
 /// Lin et al. up-scale the plane five times, which leaves holes between the points of a sparse
@@ -16,7 +19,8 @@ use crate::camera::{NEAR, Projection};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PseudoRenderConfig {
-    /// Side of a cell, in units of √(image area / N), the spacing if the points filled the image.
+    /// Side of a cell, in units of √(image area / N), the spacing if the points filled the image;
+    /// it grows with how much nearer than the mean the nearest points are.
     pub cell_size: f32,
     /// Side of the window of cells over which inverse depth is max-pooled; odd.
     pub pool_size: usize,
@@ -25,8 +29,11 @@ pub struct PseudoRenderConfig {
 }
 
 impl Default for PseudoRenderConfig {
+    /// Against the true visibility of 12 procedural cars in 36 views of 128 × 128 (precision, recall):
+    /// 0.83, 0.84 at N = 24,576; 0.85, 0.73 at 6,144; 0.87, 0.61 at 2,048. All but one point in a
+    /// hundred lie within the tolerance of a visible surface.
     fn default() -> Self {
-        Self { cell_size: 0.85, pool_size: 3, depth_tolerance: 0.04 }
+        Self { cell_size: 0.7, pool_size: 3, depth_tolerance: 0.05 }
     }
 }
 
@@ -45,7 +52,8 @@ pub fn visible_points(
     let cell_size = config.cell_size * (width * height / n as f32).sqrt();
     let plane = [width, height].map(|side| (side / cell_size).ceil() as usize);
 
-    let cells = cells(pixels, depth.clone(), size, cell_size, plane); // [b · n]
+    let cell_sizes = nearness(depth.clone()) * cell_size; // [b, 1, 1]
+    let cells = cells(pixels, depth.clone(), size, cell_sizes, plane); // [b · n]
     let inverse_depth = depth.clamp_min(NEAR).recip().reshape([b * n]);
     let nearest = nearest_in_window(cells.clone(), inverse_depth.clone(), b, plane, config);
     let nearest = nearest.gather(0, cells); // zero in the trash cell
@@ -59,6 +67,16 @@ pub fn visible_points(
     visible.chunks(n).map(of_view).collect()
 }
 
+/// How many times nearer the nearest points are than the mean, `[b, 1, 1]`: so many times wider
+/// apart do they land, and close to the camera the hidden side would show between them.
+fn nearness(depth: Tensor<3>) -> Tensor<3> {
+    let mean = depth.clone().mean_dim(1);
+    let deviation = (depth - mean.clone()).square().mean_dim(1).sqrt();
+    // Few points lie nearer than two deviations; a bound, for views from within the cloud.
+    let nearest = (mean.clone() - deviation * 2.0) / mean;
+    nearest.clamp(1.0 / MAX_NEARNESS, 1.0).recip()
+}
+
 /// The cell of each point on its view's plane, as one index over all planes, `[b · n]`.
 ///
 /// A plane ends with a trash cell, for points out of the frame or behind the camera.
@@ -66,7 +84,7 @@ fn cells(
     pixels: Tensor<3>,
     depth: Tensor<3>,
     size: [usize; 2],
-    cell_size: f32,
+    cell_sizes: Tensor<3>,
     [columns, rows]: [usize; 2],
 ) -> Tensor<1, Int> {
     let [b, n, _] = pixels.dims();
@@ -75,7 +93,7 @@ fn cells(
     let inside = pixels.clone().greater_equal_elem(0.0).bool_and(pixels.clone().lower(limits));
     let inside = inside.all_dim(2).bool_and(depth.greater_elem(NEAR));
 
-    let cell = (pixels / cell_size).mask_fill(inside.clone().bool_not().expand([b, n, 2]), 0.0);
+    let cell = (pixels / cell_sizes).mask_fill(inside.clone().bool_not().expand([b, n, 2]), 0.0);
     let cell = cell.floor().int();
     let cell = cell.clone().slice(s![.., .., 1..2]) * columns as i64 + cell.slice(s![.., .., 0..1]);
     let trash = (columns * rows) as i64;
@@ -126,7 +144,10 @@ mod tests {
         let pixels = host_values(&projection.pixels);
         let depth = host_values(&projection.depth);
         let spacing = (SIZE[0] as f32 * SIZE[1] as f32 / depth.len() as f32).sqrt();
-        let cell_size = config.cell_size * spacing;
+        let mean = depth.iter().sum::<f32>() / depth.len() as f32;
+        let variance = depth.iter().map(|z| (z - mean).powi(2)).sum::<f32>() / depth.len() as f32;
+        let nearness = (1.0 - 2.0 * variance.sqrt() / mean).clamp(1.0 / MAX_NEARNESS, 1.0).recip();
+        let cell_size = config.cell_size * spacing * nearness;
         let in_frame = |i: usize| {
             let [u, v] = [pixels[2 * i], pixels[2 * i + 1]];
             let inside = u >= 0.0 && v >= 0.0 && u < SIZE[0] as f32 && v < SIZE[1] as f32;
