@@ -208,3 +208,69 @@ impl ShapeJacobian {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        bundle_adjustment::{
+            objective::ObjectiveConfig, observations::Observations, unknowns::Parameterisation,
+        },
+        data::{
+            keyed_rng, procedural,
+            sequence::{Sequence, SequenceOptions},
+            surface::sample_surface,
+        },
+        device::Backend,
+        shape_prior,
+    };
+    use burn::module::Module;
+
+    /// Both see the same residuals; squares have twice the gradient that the equations hold.
+    #[test]
+    fn the_normal_equations_hold_the_gradient_of_the_graph() {
+        let device = Backend::Flex.device().autodiff();
+        device.seed(3);
+        let mesh = procedural::car(5);
+        let options = SequenceOptions { n_frames: 3, size: [64, 64], ..Default::default() };
+        let sequence = Sequence::render(&mesh, &options, 5);
+        let tiny = shape_prior::tests::tiny();
+        let template = sample_surface(&mesh, tiny.n_points(), &mut keyed_rng(5, [0, 0]));
+        let template: Vec<[f32; 3]> = template.iter().map(|point| point.coords.into()).collect();
+        let generator = tiny.init(&template, &device).generator.no_grad();
+
+        let observations = Observations::new(&sequence, &[1.0], &device);
+        let config = ObjectiveConfig::default();
+        let objective = Objective {
+            observations: &observations,
+            shape: &generator,
+            config: &config,
+            device: device.clone(),
+        };
+        let start = sequence.truth.expect("rendered").camera_from_world[0];
+        let style = [0.3, -0.2, 0.5, 0.1, 0.0, -0.4];
+        let unknowns = Unknowns::new(start, 3, &style, Parameterisation::ObjectCentred);
+        let mut shape = ShapeJacobian::default();
+        shape.refresh(&objective, &unknowns, style.len());
+        let config =
+            LevenbergMarquardtConfig { max_residuals: usize::MAX / 4, ..Default::default() };
+        let model = normal_equations(&objective, &unknowns, 0, &shape, &config);
+
+        let of_graph = objective.evaluate(&unknowns, 0).gradient;
+        // [p_0 | Δp_1, Δp_2 | s] there, [p_0 | s | Δp_1, Δp_2] here.
+        let in_order = [&of_graph[..6], &of_graph[18..], &of_graph[6..18]].concat();
+        let scale = in_order.iter().fold(0.0, |max: f64, g| max.max(g.abs()));
+        for (i, (expected, found)) in in_order.iter().zip(model.gradient.iter()).enumerate() {
+            // The style's derivatives are differences over a step that rounding can stand.
+            let tolerance = if (6..12).contains(&i) { 1e-2 } else { 1e-4 };
+            let error = (expected - 2.0 * found).abs();
+            assert!(error < tolerance * scale, "{in_order:?} is not twice {}", model.gradient);
+        }
+    }
+
+    #[test]
+    fn a_long_step_is_shortened_as_a_whole() {
+        let step = limited(DVector::from_vec(vec![0.4, 0.0, 0.1, 5.0, 0.0, 0.0, 0.7]), 1);
+        assert_eq!(step.as_slice(), [0.2, 0.0, 0.05, 2.5, 0.0, 0.0, 0.35]);
+    }
+}
