@@ -26,7 +26,7 @@ pub struct AlternatingConfig {
 
 impl Default for AlternatingConfig {
     fn default() -> Self {
-        Self { max_rounds: 5, loss_tolerance: 1.0, lbfgs: LbfgsConfig::default() }
+        Self { max_rounds: 5, loss_tolerance: 0.0, lbfgs: LbfgsConfig::default() }
     }
 }
 

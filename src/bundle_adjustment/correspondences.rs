@@ -35,6 +35,7 @@ impl Correspondences {
         frames: Vec<usize>,
         projection: &Projection,
         config: &ObjectiveConfig,
+        level: usize,
     ) -> Self {
         let visible = visible_points(projection, observations.size, &config.pseudo_render);
         let pixels = host_pixels(&projection.pixels);
@@ -44,7 +45,7 @@ impl Correspondences {
                 comparable(observations, [frames[0], frames[t]], [0, t], &pixels, &visible, config)
             })
             .collect();
-        let pairs = pairs(observations, &frames, &pixels, &visible, config);
+        let pairs = pairs(observations, &frames, &pixels, &visible, config, level);
         Self { frames, pixels, visible, comparable, pairs }
     }
 
@@ -81,12 +82,15 @@ fn pairs(
     pixels: &[Vec<[f32; 2]>],
     visible: &[Vec<u32>],
     config: &ObjectiveConfig,
+    level: usize,
 ) -> Vec<(usize, Vec<SilhouettePair>)> {
     // One frame alone has nothing but its own silhouette.
     let first = usize::from(!config.silhouette_of_reference && frames.len() > 1);
     let [width, height] = observations.size.map(|side| side as f32);
     let spacing = (width * height / pixels[0].len() as f32).sqrt();
+    let slack = config.tolerance_per_blur * observations.blurs[level];
     let tolerances = [config.coverage_tolerance * spacing, config.containment_tolerance];
+    let tolerances = tolerances.map(|tolerance| tolerance + slack);
     let everything: Vec<u32> = (0..pixels[0].len() as u32).collect();
     (first..frames.len())
         .into_par_iter()

@@ -153,7 +153,7 @@ fn normal_equations(
 ) -> NormalEquations {
     let poses: Vec<Isometry3<f64>> =
         unknowns.camera_from_world(&objective.device).iter().map(|pose| pose.cast()).collect();
-    let matches = objective.correspondences(unknowns);
+    let matches = objective.correspondences(unknowns, level);
     let linearisation = Linearisation {
         observations: objective.observations,
         config: objective.config,

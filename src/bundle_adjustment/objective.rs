@@ -48,6 +48,9 @@ pub struct ObjectiveConfig {
     pub coverage_tolerance: f32,
     /// Distance in pixels below which a point counts as inside the silhouette.
     pub containment_tolerance: f32,
+    /// How much both tolerances grow with each pixel of blur, in pixels: what is seen coarsely need
+    /// only fit coarsely.
+    pub tolerance_per_blur: f32,
     /// Let the reference frame's silhouette count, and average over L frames instead of L − 1.
     pub silhouette_of_reference: bool,
     /// Let hidden points count in the silhouette, too: they lie inside it as well, and close the
@@ -70,6 +73,7 @@ impl Default for ObjectiveConfig {
             silhouette_weight: 10.0,
             coverage_tolerance: 0.5,
             containment_tolerance: 0.7,
+            tolerance_per_blur: 0.0,
             silhouette_of_reference: true,
             silhouette_of_hidden_points: true,
             style_weight: 1.0,
@@ -91,6 +95,7 @@ impl ObjectiveConfig {
             silhouette_weight: 0.01,
             coverage_tolerance: 0.0,
             containment_tolerance: 0.0,
+            tolerance_per_blur: 0.0,
             silhouette_of_reference: false,
             silhouette_of_hidden_points: false,
             style_weight: 0.0,
@@ -140,13 +145,13 @@ impl Objective<'_> {
     }
 
     /// What the current estimate has compared with what, over all frames.
-    pub fn correspondences(&self, unknowns: &Unknowns) -> Correspondences {
+    pub fn correspondences(&self, unknowns: &Unknowns, level: usize) -> Correspondences {
         let leaves = unknowns.leaves(&self.device.clone().inner());
         let points = self.shape.points(leaves.style.clone()).inner();
         let points_in_camera = unknowns.poses(&leaves).camera_from_world(points);
         let projection = self.observations.intrinsics.project(points_in_camera);
         let frames = (0..unknowns.n_frames()).collect();
-        Correspondences::new(self.observations, frames, &projection, self.config)
+        Correspondences::new(self.observations, frames, &projection, self.config, level)
     }
 
     /// The objective over the reference frame and some targets.
@@ -193,7 +198,8 @@ impl Objective<'_> {
         let poses = unknowns.poses(leaves).select(index_tensor(frame_idx, &points_in_world));
         let points_in_camera = poses.camera_from_world(points_in_world);
         let projection = self.observations.intrinsics.project(points_in_camera);
-        let matches = Correspondences::new(self.observations, frames, &projection, self.config);
+        let matches =
+            Correspondences::new(self.observations, frames, &projection, self.config, level);
         let pixels = projection.pixels; // [1 + t, n, 2]
         Terms {
             photometric: self.photometric(&matches, pixels.clone(), level),

@@ -24,6 +24,8 @@ pub struct Observations {
     pub intrinsics: Intrinsics,
     /// [width, height] of every frame, in pixels.
     pub size: [usize; 2],
+    /// Each level's blur, a Gaussian's standard deviation in pixels.
+    pub(super) blurs: Vec<f32>,
     /// The frames at each level of blur.
     pub(super) images: Vec<ImageTable>,
     /// The same on the host.
@@ -46,6 +48,7 @@ impl Observations {
         Self {
             intrinsics: sequence.intrinsics,
             size: sequence.size,
+            blurs: blurs.to_vec(),
             images: host_images.iter().map(|level| ImageTable::new(level, device)).collect(),
             host_images,
             silhouettes: frames.iter().map(|frame| Silhouette::new(&frame.mask)).collect(),
