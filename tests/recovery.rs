@@ -4,7 +4,7 @@ use burn::tensor::{Tensor, TensorData};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use object_pba::{
     bundle_adjustment::{
-        BundleAdjustmentConfig, Solver, adam::AdamConfig, bundle_adjust,
+        BundleAdjustmentConfig, Solver, bundle_adjust,
         levenberg_marquardt::LevenbergMarquardtConfig, objective::ObjectiveConfig,
         shape_model::KnownPoints, unknowns::Unknowns,
     },
@@ -17,26 +17,26 @@ use object_pba::{
 use rand::Rng;
 use rayon::prelude::*;
 
-const N_SEQUENCES: u64 = 6;
+/// Sequences for Levenberg–Marquardt, and for Adam, which takes longer.
+const N_SEQUENCES: u64 = 20;
+const N_SEQUENCES_OF_ADAM: u64 = 4;
 
 /// How far every frame's pose starts from the truth: an angle, and a share of the depth.
 const PERTURBATION: (f32, f32) = (5.0, 0.05);
 
-/// A frame alone sees the pose through its silhouette only, and all frames together can turn by a
-/// degree before their colours disagree by more than pixels do: hence the weight.
+/// The silhouette holds what all frames share, which colours alone hold to two degrees; a dense cloud
+/// lets its tolerances be small.
 fn config(solver: Solver) -> BundleAdjustmentConfig {
     BundleAdjustmentConfig {
         solver,
-        blurs: vec![3.0, 0.7],
         objective: ObjectiveConfig {
             silhouette_weight: 100.0,
-            coverage_tolerance: 0.1,
-            containment_tolerance: 0.5,
+            tolerance_per_blur: 0.0,
             ..Default::default()
         },
-        adam: AdamConfig { iterations: 60, ..Default::default() },
         lm: LevenbergMarquardtConfig {
             iterations: 20,
+            max_residuals: 2000,
             relative_tolerance: 1e-5,
             ..Default::default()
         },
@@ -45,28 +45,25 @@ fn config(solver: Solver) -> BundleAdjustmentConfig {
 }
 
 #[test]
-fn adam_recovers_perturbed_poses() {
-    check_recovery(Solver::Adam);
+fn levenberg_marquardt_recovers_nine_in_ten_to_under_a_degree() {
+    let errors = remaining_errors(N_SEQUENCES, 24_576, Solver::Lm);
+    let n_recovered = errors.iter().filter(|&&error| error < 1.0).count();
+    assert!(10 * n_recovered >= 9 * errors.len(), "{errors:.2?}");
 }
 
 #[test]
-fn levenberg_marquardt_recovers_perturbed_poses() {
-    check_recovery(Solver::Lm);
+fn adam_recovers_most_of_the_way() {
+    let errors = remaining_errors(N_SEQUENCES_OF_ADAM, 6144, Solver::Adam);
+    assert!(errors.iter().all(|&error| error < 2.5), "{errors:.2?}");
 }
 
-/// Of 5° of error in every frame, less than 2.2° are left in any sequence, and 1.6° in the mean.
-#[track_caller]
-fn check_recovery(solver: Solver) {
-    let errors: Vec<f32> =
-        (0..N_SEQUENCES).into_par_iter().map(|seed| remaining_error(seed, solver)).collect();
-    let mean = errors.iter().sum::<f32>() / errors.len() as f32;
-    assert!(mean < 1.6, "mean of {errors:.2?}");
-    assert!(errors.iter().all(|&error| error < 2.2), "{errors:.2?}");
+fn remaining_errors(n_sequences: u64, n_points: usize, solver: Solver) -> Vec<f32> {
+    (0..n_sequences).into_par_iter().map(|seed| remaining_error(seed, n_points, solver)).collect()
 }
 
 /// Mean rotation error over the frames of one sequence, in degrees.
-fn remaining_error(seed: u64, solver: Solver) -> f32 {
-    let options = SequenceOptions { n_true_points: 6144, ..Default::default() };
+fn remaining_error(seed: u64, n_points: usize, solver: Solver) -> f32 {
+    let options = SequenceOptions { n_true_points: n_points, ..Default::default() };
     let sequence = Sequence::render(&procedural::car(seed), &options, seed);
     let truth = sequence.truth.as_ref().expect("rendered");
     let points = truth.points.as_ref().expect("asked for");

@@ -33,9 +33,9 @@ pub struct LevenbergMarquardtConfig {
 impl Default for LevenbergMarquardtConfig {
     fn default() -> Self {
         Self {
-            iterations: 10,
+            iterations: 15,
             n_directions: 16,
-            max_residuals: 2000,
+            max_residuals: 4000,
             relative_first: 3,
             relative_tolerance: 1e-4,
         }
