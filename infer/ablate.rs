@@ -115,5 +115,5 @@ fn picture(
     let colors: Vec<[u8; 3]> = colors.iter().map(|c| c.unwrap_or(figures::UNSEEN)).collect();
     let cloud = host_points(&points(shape, unknowns, device));
     let reference = unknowns.camera_from_world(device)[0];
-    figures::cloud_views(sequence, &reference, &cloud, &colors)
+    figures::cloud_views(&reference, &cloud, &colors)
 }

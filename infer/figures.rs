@@ -9,15 +9,63 @@ use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use object_pba::{
     bundle_adjustment::{BundleAdjustmentConfig, Outcome},
     checkpoint::Prior,
-    data::{ColorImage, sequence::Sequence},
+    data::{ColorImage, crop::silhouette_box, sequence::Sequence},
+    loss::MASK_THRESHOLD,
     reconstruction::{Views, views},
 };
 
 /// Points that no frame saw are drawn in red, as in the paper's Fig. 1.
 pub const UNSEEN: [u8; 3] = [200, 60, 50];
-/// How much panels are magnified.
-const ZOOM: u32 = 2;
+/// Colour of the points drawn over a frame.
+const OVERLAY: Rgb<u8> = Rgb([60, 110, 255]);
+/// Side of a panel, in pixels.
+const PANEL: u32 = 240;
+/// Share of the object's extent that a panel shows around it.
+const MARGIN: f32 = 0.12;
 const PAPER: Rgb<u8> = Rgb([255; 3]);
+
+/// The square part of a frame that a panel shows, in pixels of the frame.
+#[derive(Clone, Copy)]
+struct Window {
+    left: f32,
+    top: f32,
+    side: f32,
+}
+
+impl Window {
+    /// Around the object in some frames.
+    fn around(sequence: &Sequence, frames: &[usize]) -> Self {
+        let boxes =
+            frames.iter().filter_map(|&f| silhouette_box(&sequence.frames[f].mask, MASK_THRESHOLD));
+        let whole = [0.0, 0.0, sequence.size[0] as f32, sequence.size[1] as f32];
+        let union =
+            boxes.reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])]);
+        let [left, top, right, bottom] = union.unwrap_or(whole);
+        let side = (right - left).max(bottom - top) * (1.0 + 2.0 * MARGIN);
+        let center = [(left + right) / 2.0, (top + bottom) / 2.0];
+        Self { left: center[0] - side / 2.0, top: center[1] - side / 2.0, side }
+    }
+
+    fn zoom(&self) -> f32 {
+        PANEL as f32 / self.side
+    }
+
+    /// Where a location of the frame lies in the panel.
+    fn place(&self, [u, v]: [f32; 2]) -> [f32; 2] {
+        [(u - self.left) * self.zoom(), (v - self.top) * self.zoom()]
+    }
+
+    /// The frame, magnified.
+    fn show(&self, frame: &ColorImage) -> RgbImage {
+        RgbImage::from_fn(PANEL, PANEL, |x, y| {
+            let [u, v] = [x, y].map(|i| (i as f32 + 0.5) / self.zoom());
+            let at = [u + self.left, v + self.top];
+            let inside = at[0] >= 0.0 && at[1] >= 0.0;
+            let inside = inside && at[0] < frame.width() as f32 && at[1] < frame.height() as f32;
+            if inside { rgb(nearest_color(frame, at)) } else { PAPER }
+        })
+    }
+}
 
 /// Writes a picture for each stage, and all of them as one strip.
 ///
@@ -48,33 +96,23 @@ pub fn write_stages(
 
 fn stage(sequence: &Sequence, views: &Views) -> RgbImage {
     let last = sequence.frames.len() - 1;
+    let window = Window::around(sequence, &[0, last]);
     let [reference, target] = [0, last].map(|frame| &sequence.frames[frame].color);
-    let size = sequence.size.map(|side| side as u32);
-    let mut panels = [0; 4].map(|_| RgbImage::from_pixel(size[0], size[1], PAPER));
+    let mut panels = [0; 3].map(|_| RgbImage::from_pixel(PANEL, PANEL, PAPER));
     for &point in &views.visible[0] {
         let [at, there] = [0, last].map(|frame| views.pixels[frame][point as usize]);
         let (a, b) = (nearest_color(reference, at), nearest_color(target, there));
         let residual = std::array::from_fn(|c| 1.0 - 2.0 * (a[c] - b[c]).abs());
         for (panel, color) in panels.iter_mut().zip([a, b, residual]) {
-            splat(panel, at, rgb(color));
+            splat(panel, window.place(at), window.zoom() * 1.8, rgb(color));
         }
     }
-    panels[3] =
-        overlay(target, views.visible[last].iter().map(|&i| views.pixels[last][i as usize]));
-    side_by_side(&panels)
-}
-
-/// A frame with points drawn over it, so that silhouettes can be compared (Fig. 6).
-fn overlay(frame: &ColorImage, points: impl Iterator<Item = [f32; 2]>) -> RgbImage {
-    let mut panel =
-        RgbImage::from_fn(frame.width(), frame.height(), |u, v| rgb(frame.get_pixel(u, v).0));
-    for [u, v] in points {
-        if let Some(pixel) = pixel_at(&mut panel, [u, v]) {
-            let [r, g, b] = pixel.0;
-            *pixel = Rgb([r / 2, g / 2, b / 2 + 127]);
-        }
+    let mut overlay = window.show(target);
+    for &point in &views.visible[last] {
+        splat(&mut overlay, window.place(views.pixels[last][point as usize]), 2.0, OVERLAY);
     }
-    panel
+    let [reference, target, residual] = panels;
+    side_by_side(&[reference, target, residual, overlay])
 }
 
 /// The colour of each point, averaged over the frames that see it; `None` where none does.
@@ -97,17 +135,15 @@ pub fn point_colors(sequence: &Sequence, views: &Views) -> Vec<Option<[u8; 3]>> 
 /// Writes the cloud as the reference camera sees it, and from three quarter turns about it.
 pub fn write_cloud(
     path: &Path,
-    sequence: &Sequence,
     reference: &Isometry3<f32>,
     points: &[[f32; 3]],
     colors: &[[u8; 3]],
 ) -> Result<()> {
-    save(&cloud_views(sequence, reference, points, colors), path)
+    save(&cloud_views(reference, points, colors), path)
 }
 
 /// The cloud from four sides, side by side.
 pub fn cloud_views(
-    sequence: &Sequence,
     reference: &Isometry3<f32>,
     points: &[[f32; 3]],
     colors: &[[u8; 3]],
@@ -116,52 +152,47 @@ pub fn cloud_views(
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), degrees.to_radians());
         let mut pose = *reference;
         pose.rotation *= turn;
-        draw_cloud(sequence, &pose, points, colors)
+        draw_cloud(&pose, points, colors)
     });
     side_by_side(&views)
 }
 
-/// Points as discs of their spacing, nearer ones over farther ones and darker with distance.
+/// Points as squares, nearer ones over farther ones and darker with distance.
 fn draw_cloud(
-    sequence: &Sequence,
     camera_from_world: &Isometry3<f32>,
     points: &[[f32; 3]],
     colors: &[[u8; 3]],
 ) -> RgbImage {
-    let [width, height] = sequence.size.map(|side| side as u32 * ZOOM);
-    let (focal, center) = (sequence.intrinsics.focal, sequence.intrinsics.center);
-    let mut panel = RgbImage::from_pixel(width, height, PAPER);
+    let mut panel = RgbImage::from_pixel(PANEL, PANEL, PAPER);
+    let distance = camera_from_world.translation.vector.norm();
+    // The object's diagonal of 1 spans most of the panel.
+    let scale = PANEL as f32 * 0.9 * distance;
+    let size = PANEL as f32 * 2.0 / (points.len() as f32).sqrt();
+    let center = camera_from_world.translation.vector;
     let mut placed: Vec<(f32, [f32; 2], [u8; 3])> = points
         .iter()
         .zip(colors)
         .map(|(&point, &color)| {
             let p = camera_from_world * Point3::from(point);
-            let at = [0, 1].map(|i| ZOOM as f32 * (focal[i] * p[i] / p.z + center[i]));
-            (p.z, at, color)
+            let at = |i: usize| PANEL as f32 / 2.0 + scale * (p[i] / p.z - center[i] / center.z);
+            (p.z, [at(0), at(1)], color)
         })
         .filter(|(depth, ..)| *depth > 0.0)
         .collect();
     placed.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let distance = camera_from_world.translation.vector.norm();
     for (depth, at, color) in placed {
         let shade = (1.0 - 0.7 * (depth - distance + 0.3)).clamp(0.4, 1.0);
-        let color = Rgb(color.map(|channel| (f32::from(channel) * shade) as u8));
-        splat(&mut panel, at, color);
-        for (du, dv) in [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-            splat(&mut panel, [at[0] + du, at[1] + dv], color);
-        }
+        splat(&mut panel, at, size, Rgb(color.map(|channel| (f32::from(channel) * shade) as u8)));
     }
-    imageops::resize(&panel, width / ZOOM, height / ZOOM, imageops::FilterType::Triangle)
+    panel
 }
 
-/// Panels in a row, magnified, with a white seam.
+/// Panels in a row, with a white seam.
 pub fn side_by_side(panels: &[RgbImage]) -> RgbImage {
-    let (width, height) = (panels[0].width() * ZOOM, panels[0].height() * ZOOM);
     let n = panels.len() as u32;
-    let mut row = RgbImage::from_pixel(n * width + (n - 1) * 4, height, PAPER);
+    let mut row = RgbImage::from_pixel(n * PANEL + (n - 1) * 4, PANEL, PAPER);
     for (i, panel) in (0..).zip(panels) {
-        let panel = imageops::resize(panel, width, height, imageops::FilterType::Nearest);
-        imageops::replace(&mut row, &panel, i * i64::from(width + 4), 0);
+        imageops::replace(&mut row, panel, i * i64::from(PANEL + 4), 0);
     }
     row
 }
@@ -183,14 +214,18 @@ pub fn save(image: &RgbImage, path: &Path) -> Result<()> {
     image.save(path).with_context(|| format!("cannot write {}", path.display()))
 }
 
-fn splat(panel: &mut RgbImage, at: [f32; 2], color: Rgb<u8>) {
-    if let Some(pixel) = pixel_at(panel, at) {
-        *pixel = color;
+/// Draws a square around a location of the panel.
+fn splat(panel: &mut RgbImage, [u, v]: [f32; 2], side: f32, color: Rgb<u8>) {
+    let range = |center: f32, limit: u32| {
+        let first = (center - side / 2.0).round().max(0.0) as u32;
+        let last = (center + side / 2.0).round().clamp(0.0, limit as f32) as u32;
+        first..last
+    };
+    for y in range(v, panel.height()) {
+        for x in range(u, panel.width()) {
+            panel.put_pixel(x, y, color);
+        }
     }
-}
-
-fn pixel_at(panel: &mut RgbImage, [u, v]: [f32; 2]) -> Option<&mut Rgb<u8>> {
-    (u >= 0.0 && v >= 0.0).then(|| panel.get_pixel_mut_checked(u as u32, v as u32)).flatten()
 }
 
 fn nearest_color(image: &ColorImage, [u, v]: [f32; 2]) -> [f32; 3] {

@@ -68,7 +68,7 @@ pub fn write(
     fs::write(&path, metrics).with_context(|| format!("cannot write {}", path.display()))?;
     figures::write_stages(out, prior, sequence, config, &device, &reconstruction.outcome)?;
     let seen: Vec<[u8; 3]> = colors.iter().map(|color| color.unwrap_or(figures::UNSEEN)).collect();
-    figures::write_cloud(&out.join("cloud.png"), sequence, &poses[0], &cloud, &seen)
+    figures::write_cloud(&out.join("cloud.png"), &poses[0], &cloud, &seen)
 }
 
 fn write_history(path: &Path, history: &[Step]) -> Result<()> {
