@@ -42,7 +42,12 @@ pub fn initial_guess(prior: &Prior, sequence: &Sequence, frame: &Frame) -> Optio
     Some(InitialGuess { style: guess.style, poses })
 }
 
-/// The hypotheses that bundle adjustment starts from: Δp_l = 0, and each pose of the guess.
+/// Share of the likeliest pose's confidence that another needs to be tried: front and back look alike
+/// coarsely, and where the regressor is sure, it is more often right than a coarse fit.
+const LEAST_CONFIDENCE: f32 = 0.2;
+
+/// The hypotheses that bundle adjustment starts from: Δp_l = 0, and each pose of the guess that is
+/// not too unlikely.
 pub fn hypotheses(
     guess: &InitialGuess,
     n_frames: usize,
@@ -51,7 +56,8 @@ pub fn hypotheses(
     let unknowns = |(pose, _): &(Isometry3<f32>, f32)| {
         Unknowns::new(*pose, n_frames, &guess.style, parameterisation)
     };
-    guess.poses.iter().map(unknowns).collect()
+    let least = LEAST_CONFIDENCE * guess.poses[0].1;
+    guess.poses.iter().filter(|(_, confidence)| *confidence >= least).map(unknowns).collect()
 }
 
 /// Initialises from the reference frame and adjusts. `None` when its mask is empty.
