@@ -113,7 +113,7 @@ fn table(entries: &[Entry]) -> String {
     for model in models {
         let of_model: Vec<&Report> =
             done.iter().filter(|(name, _)| *name == model).map(|(_, report)| *report).collect();
-        let arrow = |value: fn(&Scores) -> Option<f64>| {
+        let arrow = |value: output::Figure| {
             let of = |scores: fn(&Report) -> &Scores| {
                 let values = of_model.iter().filter_map(|&report| value(scores(report)));
                 cell(mean(&values.collect::<Vec<f64>>()))

@@ -22,8 +22,11 @@ use crate::{figures, run::Reconstruction};
 /// Colour of points that no frame saw.
 const UNSEEN: [u8; 3] = [128; 3];
 
+/// Reads one figure of a state.
+pub type Figure = fn(&Scores) -> Option<f64>;
+
 /// The rows of a summary: a name with its unit, and where to read it.
-pub const ROWS: [(&str, fn(&Scores) -> Option<f64>); 8] = [
+pub const ROWS: [(&str, Figure); 8] = [
     ("reference rotation error (deg)", |s| s.poses.reference_rotation_error_deg),
     ("mean rotation error over frames (deg)", |s| s.poses.rotation_error_deg_mean),
     ("relative rotation error (deg)", |s| s.poses.relative_rotation_error_deg_mean),

@@ -66,7 +66,7 @@ fn sections_follow_each_other_without_crossing() {
         let profile = Profile::new(&shape);
         let body = body(&profile);
         let outside = |face: &&Face| {
-            !is_underside(face.column) && !(profile.bed().is_some() && is_upper_side(face.column))
+            !(is_underside(face.column) || profile.bed().is_some() && is_upper_side(face.column))
         };
         // Where sections crossed, faces would look back at the spine of the car.
         for face in body.faces.iter().filter(outside) {
