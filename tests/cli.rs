@@ -125,8 +125,9 @@ fn a_missing_frame_is_named() {
 #[test]
 fn a_frame_of_another_size_is_named() {
     let sequence = sample();
-    let path = sequence.path().join("images/frame_002.png");
-    image::RgbImage::new(64, 32).save(&path).unwrap();
+    image::RgbImage::new(64, 32).save(sequence.path().join("images/frame_002.png")).unwrap();
+    let mask = image::GrayImage::from_pixel(64, 32, image::Luma([255]));
+    mask.save(sequence.path().join("masks/frame_002.png")).unwrap();
     check_refused(&run(sequence.path(), &[]), &["frame_002.png", "64"]);
 }
 
@@ -161,11 +162,14 @@ fn an_unknown_config_key_is_named() {
 }
 
 #[test]
-fn a_folder_of_broken_meshes_is_refused_with_their_reason() {
+fn a_broken_mesh_is_refused_with_its_file_and_line() {
     let root = TempDir::new().unwrap();
-    let model = root.path().join("02958343/broken/models");
-    fs::create_dir_all(&model).unwrap();
-    fs::write(model.join("model_normalized.obj"), "v 0 0\nf 1 2 nine\n").unwrap();
+    for id in 0..6 {
+        let model = root.path().join(format!("02958343/broken_{id}/models"));
+        fs::create_dir_all(&model).unwrap();
+        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 nine\n";
+        fs::write(model.join("model_normalized.obj"), text).unwrap();
+    }
     let out = root.path().join("out");
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/tiny.toml");
     let output = pba_train(&[
@@ -177,5 +181,5 @@ fn a_folder_of_broken_meshes_is_refused_with_their_reason() {
         "--out",
         out.to_str().unwrap(),
     ]);
-    check_refused(&output, &["02958343"]);
+    check_refused(&output, &["02958343", "model_normalized.obj", "line 4"]);
 }

@@ -151,7 +151,7 @@ fn broken_pictures_are_refused() {
     mask_to_luma8(&ScalarImage::from_pixel(8, 6, Luma([1.0])))
         .save(folder.path().join("masks/frame_001.png"))
         .expect("it is writable");
-    check_refused(&folder, TRANSFORMS, "frame 1");
+    check_refused(&folder, TRANSFORMS, "frame_001.png is [8, 6]");
 
     let folder = written(|json| json["frames"][0]["mask_path"] = Value::Null);
     check_refused(&folder, "images/frame_000", "neither");

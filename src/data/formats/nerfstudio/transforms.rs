@@ -150,8 +150,10 @@ impl Transforms {
         mut sizes: impl Iterator<Item = [usize; 2]>,
     ) -> Result<[usize; 2], String> {
         let first = sizes.next().ok_or("it has no frames")?;
-        if let Some(idx) = sizes.position(|size| size != first) {
-            return Err(format!("frame {} is not of frame 0's size {first:?}", idx + 1));
+        let mut others = self.frames.iter().skip(1).zip(sizes);
+        if let Some((frame, size)) = others.find(|(_, size)| *size != first) {
+            let path = frame.file_path.display();
+            return Err(format!("{path} is {size:?} pixels, and the first frame {first:?}"));
         }
         let stated = [self.w, self.h];
         let differs = |(stated, side): (Option<f64>, usize)| {
