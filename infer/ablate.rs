@@ -23,7 +23,11 @@ use crate::{Options, figures, output};
 const POINT_RATE: f64 = 2e-3;
 
 pub fn ablate(sequences: &[std::path::PathBuf], out: &Path, options: &Options) -> Result<()> {
-    let config = options.bundle_adjustment()?;
+    let mut config = options.bundle_adjustment()?;
+    // Free points are too many for second-order steps, and both arms share a solver.
+    if config.solver == Solver::Lm {
+        config.solver = Solver::Adam;
+    }
     let device = options.device.device().autodiff();
     let prior = options.load_prior(&device)?;
     fs::create_dir_all(out).with_context(|| format!("cannot create {}", out.display()))?;
@@ -78,12 +82,6 @@ fn compare(
         .map(|start| start.with_style(host_points(&cloud).as_flattened()))
         .collect();
 
-    // Points are too many for second-order steps.
-    let mut config = config.clone();
-    if config.solver == Solver::Lm {
-        config.solver = Solver::Adam;
-    }
-    let config = &config;
     let mut free_config = config.clone();
     free_config.objective.style_weight = 0.0;
     free_config.adam.style_rate = POINT_RATE;

@@ -11,7 +11,8 @@ use burn::{
 };
 
 use crate::{
-    Error, Result, regressor::Regressors, shape_prior::ShapePrior, training::TrainingConfig,
+    Error, Result, data::formats::write_atomically, regressor::Regressors, shape_prior::ShapePrior,
+    training::TrainingConfig,
 };
 
 pub const CONFIG_FILE: &str = "config.toml";
@@ -81,15 +82,6 @@ pub fn save_weights<M: Module>(module: &M, path: &Path) -> Result<()> {
     let unusable = |reason: String| Error::Prior { path: path.into(), reason };
     module.valid().save_into(&mut store).map_err(|error| unusable(error.to_string()))?;
     write_atomically(path, &store.get_bytes().map_err(|error| unusable(error.to_string()))?)
-}
-
-/// Writes a file beside its place and moves it there, so that no reader sees a part of it.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut scratch = path.as_os_str().to_owned();
-    scratch.push(".part");
-    let scratch = Path::new(&scratch);
-    fs::write(scratch, bytes).map_err(Error::io(scratch))?;
-    fs::rename(scratch, path).map_err(Error::io(path))
 }
 
 fn shape_from_bytes(

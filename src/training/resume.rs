@@ -10,7 +10,7 @@ use burn::{
     tensor::Bytes,
 };
 
-use crate::{Error, Result, checkpoint::write_atomically};
+use crate::{Error, Result, data::formats::write_atomically};
 
 /// Step, milliseconds and length of the weights, as 64-bit little-endian numbers.
 const HEADER: usize = 3 * size_of::<u64>();
