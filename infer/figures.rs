@@ -10,8 +10,8 @@ use object_pba::{
     bundle_adjustment::{BundleAdjustmentConfig, Outcome},
     checkpoint::Prior,
     data::{ColorImage, crop::silhouette_box, sequence::Sequence},
-    loss::MASK_THRESHOLD,
     reconstruction::{Views, views},
+    silhouette::MASK_THRESHOLD,
 };
 
 /// Points that no frame saw are drawn in red, as in the paper's Fig. 1.

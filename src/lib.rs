@@ -12,6 +12,7 @@ pub mod pseudo_render;
 pub mod sampling;
 pub mod nearest_neighbours;
 pub mod chamfer;
+pub mod silhouette;
 pub mod loss;
 pub mod bundle_adjustment;
 pub mod metrics;

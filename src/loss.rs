@@ -2,10 +2,7 @@
 
 use burn::tensor::{Tensor, TensorData};
 
-use crate::{data::ScalarImage, host::index_tensor, nearest_neighbours::NearestNeighbours};
-
-/// Coverage above which a pixel belongs to the object.
-pub const MASK_THRESHOLD: f32 = 0.5;
+use crate::{host::index_tensor, nearest_neighbours::NearestNeighbours, silhouette::Silhouette};
 
 /// Charbonnier's loss of a squared residual, 2σ²(√(1 + r²/σ²) − 1): r² near zero, 2σ|r| far out.
 pub fn charbonnier<const D: usize>(squared: Tensor<D>, scale: f32) -> Tensor<D> {
@@ -13,82 +10,61 @@ pub fn charbonnier<const D: usize>(squared: Tensor<D>, scale: f32) -> Tensor<D> 
     ((squared / scale_squared + 1.0).sqrt() - 1.0) * (2.0 * scale_squared)
 }
 
-/// The pixels U_l1 of one frame's silhouette, ready to be matched with projected points.
-pub struct Silhouette {
-    /// Centres of the pixels inside.
-    pub pixels: Vec<[f32; 2]>,
-    /// For each pixel of the image, its index in `pixels`.
-    pixel_idx: Vec<Option<u32>>,
-    width: usize,
-    height: usize,
-    search: NearestNeighbours,
-}
-
-impl Silhouette {
-    /// `None` when no pixel of the mask belongs to the object.
-    pub fn new(mask: &ScalarImage) -> Option<Self> {
-        let (width, height) = (mask.width() as usize, mask.height() as usize);
-        let mut pixels = Vec::new();
-        let mut pixel_idx = vec![None; width * height];
-        for (u, v, coverage) in mask.enumerate_pixels() {
-            if coverage[0] > MASK_THRESHOLD {
-                pixel_idx[v as usize * width + u as usize] = Some(pixels.len() as u32);
-                pixels.push([u as f32 + 0.5, v as f32 + 0.5]);
-            }
-        }
-        if pixels.is_empty() {
-            return None;
-        }
-        let search = NearestNeighbours::in_plane(pixels.iter().copied());
-        Some(Self { pixels, pixel_idx, width, height, search })
-    }
-
-    /// The silhouette's pixel centre nearest to a location: its own pixel's, when that is inside.
-    pub fn nearest(&self, location: [f32; 2]) -> [f32; 2] {
-        let [u, v] = location;
-        let in_frame = u >= 0.0 && v >= 0.0 && u < self.width as f32 && v < self.height as f32;
-        let own = in_frame.then(|| self.pixel_idx[v as usize * self.width + u as usize]).flatten();
-        self.pixels[own.unwrap_or_else(|| self.search.nearest_pixel(location)) as usize]
-    }
-}
-
-/// A projected point, and the silhouette pixel that it belongs to.
+/// A projected point, and the location of the silhouette that it belongs to.
 #[derive(Clone, Copy, Debug)]
 pub struct SilhouettePair {
     pub point_idx: u32,
-    /// The pixel's centre.
+    /// A pixel's centre, or of the outline.
     pub target: [f32; 2],
     pub weight: f32,
     /// Distance in pixels from which on the pair counts.
     pub tolerance: f32,
 }
 
+/// What of a silhouette is matched, and how strictly.
+#[derive(Clone, Copy, Debug)]
+pub struct SilhouetteMatching {
+    /// Measure to the outline at half coverage, a fraction of a pixel, where Eq. 5 only knows pixels.
+    pub to_outline: bool,
+    /// Weights of a pixel's distance to its point, and of a point's to its pixel.
+    pub weights: [f32; 2],
+    /// Distances in pixels up to which either counts as matched. Eq. 5 has none, and then asks for
+    /// points exactly at the centres of pixels, and for as many of them as there are pixels.
+    pub tolerances: [f32; 2],
+}
+
 /// Pairs each silhouette pixel with its nearest projected point, and each point with its nearest
-/// pixel; `weights` are those of the two directions.
-///
-/// So are `tolerances`, the distances in pixels up to which a pair counts as matched. Eq. 5 has none,
-/// and then asks for points exactly at the centres of pixels, and for as many of them as there are
-/// pixels. `visible` are indices into `projected`, and not empty.
+/// pixel. `visible` are indices into `projected`, and not empty.
 pub fn silhouette_pairs(
     silhouette: &Silhouette,
     projected: &[[f32; 2]],
     visible: &[u32],
-    weights: [f32; 2],
-    tolerances: [f32; 2],
+    matching: &SilhouetteMatching,
 ) -> Vec<SilhouettePair> {
     let mut pairs = Vec::new();
-    let mut pair = |point_idx: u32, target: [f32; 2], direction: usize| {
-        let ([u, v], tolerance) = (projected[point_idx as usize], tolerances[direction]);
+    let ([of_pixel, of_point], [coverage, containment]) = (matching.weights, matching.tolerances);
+    let mut pair = |point_idx: u32, target: [f32; 2], weight: f32, tolerance: f32| {
+        let [u, v] = projected[point_idx as usize];
         if (u - target[0]).powi(2) + (v - target[1]).powi(2) > tolerance * tolerance {
-            pairs.push(SilhouettePair { point_idx, target, weight: weights[direction], tolerance });
+            pairs.push(SilhouettePair { point_idx, target, weight, tolerance });
         }
     };
     let search = NearestNeighbours::in_plane(visible.iter().map(|&i| projected[i as usize]));
-    for &pixel in &silhouette.pixels {
-        pair(visible[search.nearest_pixel(pixel) as usize], pixel, 0);
+    let mut cover = |location: [f32; 2], weight: f32| {
+        pair(visible[search.nearest_pixel(location) as usize], location, weight, coverage);
+    };
+    silhouette.pixels.iter().for_each(|&pixel| cover(pixel, of_pixel));
+    if matching.to_outline {
+        let weight = of_pixel * Silhouette::OUTLINE_WEIGHT;
+        silhouette.outline.iter().for_each(|&location| cover(location, weight));
     }
     for &point_idx in visible {
-        pair(point_idx, silhouette.nearest(projected[point_idx as usize]), 1);
+        let at = projected[point_idx as usize];
+        let target = match matching.to_outline {
+            true => silhouette.nearest_inside(at),
+            false => silhouette.nearest_pixel(at),
+        };
+        pair(point_idx, target, of_point, containment);
     }
     pairs
 }

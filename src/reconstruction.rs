@@ -18,9 +18,9 @@ use crate::{
         sequence::{Frame, Sequence},
     },
     host::{host_pixels, host_points},
-    loss::MASK_THRESHOLD,
     metrics::{PoseErrors, style_error},
     pseudo_render::{PseudoRenderConfig, visible_points},
+    silhouette::MASK_THRESHOLD,
 };
 
 /// R_s(I_0) and R_p(I_0): what the regressors make of one frame (Sec. 3.2).
@@ -145,10 +145,11 @@ pub fn views(
 ) -> Views {
     let device = device.clone().inner();
     let poses = unknowns.poses(&unknowns.leaves(&device));
-    let in_camera = poses.camera_from_world(points(shape, unknowns, &device));
-    let projection = sequence.intrinsics.project(in_camera);
+    let Sequence { intrinsics, size, .. } = sequence;
+    let points = points(shape, unknowns, &device);
+    let projection = intrinsics.project(poses.camera_from_world(points.clone()));
     Views {
         pixels: host_pixels(&projection.pixels),
-        visible: visible_points(&projection, sequence.size, pseudo_render),
+        visible: visible_points(points, &poses, intrinsics, *size, pseudo_render),
     }
 }

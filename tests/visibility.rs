@@ -28,30 +28,22 @@ const THICKNESS: f32 = 0.004;
 
 #[test]
 fn visible_points_are_those_that_the_mesh_does_not_hide() {
-    let config = PseudoRenderConfig::default();
-    // What is lost are wheels in their arches and other layers nearer than the depth tolerance,
-    // and surfaces so steep that they fall by more than it within a cell.
-    let (precision, recall) = precision_and_recall(24_576, THICKNESS, &config);
-    assert!(precision >= 0.8, "precision is {precision}");
-    assert!(recall >= 0.8, "recall is {recall}");
+    let (precision, recall) = precision_and_recall(24_576, &PseudoRenderConfig::default());
+    assert!(precision >= 0.95, "precision is {precision}");
+    assert!(recall >= 0.85, "recall is {recall}");
 }
 
 #[test]
-fn no_view_sees_through_the_surface() {
-    let config = PseudoRenderConfig::default();
-    let thickness = THICKNESS + config.depth_tolerance;
-    for n_points in [24_576, 2048] {
-        let (precision, _) = precision_and_recall(n_points, thickness, &config);
-        assert!(precision >= 0.97, "precision is {precision} at {n_points} points");
+fn sparse_clouds_show_little_of_their_hidden_side() {
+    for n_points in [6144, 2048] {
+        let (precision, recall) = precision_and_recall(n_points, &PseudoRenderConfig::default());
+        assert!(precision >= 0.9, "precision is {precision} at {n_points} points");
+        assert!(recall >= 0.75, "recall is {recall} at {n_points} points");
     }
 }
 
-/// The means over cars and views; what lies less than `thickness` behind the surface counts as on it.
-fn precision_and_recall(
-    n_points: usize,
-    thickness: f32,
-    config: &PseudoRenderConfig,
-) -> (f32, f32) {
+/// The means over cars and views.
+fn precision_and_recall(n_points: usize, config: &PseudoRenderConfig) -> (f32, f32) {
     let mut sums = [0.0; 2];
     for seed in 0..N_CARS {
         let mesh = procedural::car(seed);
@@ -59,7 +51,7 @@ fn precision_and_recall(
         for view_idx in 0..VIEWS_PER_CAR {
             let rng = &mut keyed_rng(seed, [2, view_idx]);
             let view = Viewpoint::random(&mesh.vertices, SIZE, &ViewpointRange::default(), rng);
-            let truth = truly_visible(&mesh, &points, &view, thickness);
+            let truth = truly_visible(&mesh, &points, &view);
             let found = pseudo_rendered(&points, &view, config);
             let n_right = found.iter().filter(|&&i| truth[i as usize]).count() as f32;
             sums[0] += n_right / found.len() as f32;
@@ -79,17 +71,11 @@ fn pseudo_rendered(
     let values: Vec<f32> = points.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
     let points = Tensor::from_data(TensorData::new(values, [1, points.len(), 3]), &device);
     let pose = Pose::from_isometries(&[view.camera_from_world], &device);
-    let projection = view.intrinsics.project(pose.camera_from_world(points));
-    visible_points(&projection, SIZE, config).remove(0)
+    visible_points(points, &pose, &view.intrinsics, SIZE, config).remove(0)
 }
 
-/// Whether each point is in the frame, and no part of the mesh is in front by over `thickness`.
-fn truly_visible(
-    mesh: &Mesh,
-    points: &[Point3<f32>],
-    view: &Viewpoint,
-    thickness: f32,
-) -> Vec<bool> {
+/// Whether each point is in the frame, and no part of the mesh is in front by over [`THICKNESS`].
+fn truly_visible(mesh: &Mesh, points: &[Point3<f32>], view: &Viewpoint) -> Vec<bool> {
     let times = |x: f32| x * SUPERSAMPLING as f32;
     let Intrinsics { focal, center } = view.intrinsics;
     let intrinsics = Intrinsics { focal: focal.map(times), center: center.map(times) };
@@ -101,7 +87,7 @@ fn truly_visible(
         let point = view.camera_from_world * point;
         Some(point.z - surface_depth(&depth, project(&point, &intrinsics))?)
     };
-    points.iter().map(|point| behind(point).is_some_and(|behind| behind <= thickness)).collect()
+    points.iter().map(|point| behind(point).is_some_and(|behind| behind <= THICKNESS)).collect()
 }
 
 /// The depth of the surface at a location: the greatest nearby, since a slanting surface varies

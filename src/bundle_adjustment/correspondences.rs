@@ -1,6 +1,7 @@
 //! What is compared with what, decided outside the graph from the current estimate: which points a
 //! view sees, which colours may be compared, which silhouette pixel belongs to which point.
 
+use burn::tensor::Tensor;
 use rayon::prelude::*;
 
 use super::{
@@ -8,9 +9,9 @@ use super::{
     observations::Observations,
 };
 use crate::{
-    camera::Projection,
+    camera::{Pose, Projection},
     host::host_pixels,
-    loss::{SilhouettePair, silhouette_pairs},
+    loss::{SilhouetteMatching, SilhouettePair, silhouette_pairs},
     pseudo_render::visible_points,
 };
 
@@ -29,15 +30,18 @@ pub struct Correspondences {
 }
 
 impl Correspondences {
-    /// `projection` holds the points in each of `frames`, `[1 + t, n, …]`.
+    /// Of a cloud `[1, n, 3]` seen from `poses`, one for each of `frames`; `projection` is where it
+    /// lands in them, `[1 + t, n, …]`.
     pub fn new(
         observations: &Observations,
         frames: Vec<usize>,
-        projection: &Projection,
+        (points_in_world, poses, projection): (Tensor<3>, &Pose, &Projection),
         config: &ObjectiveConfig,
         level: usize,
     ) -> Self {
-        let visible = visible_points(projection, observations.size, &config.pseudo_render);
+        let Observations { intrinsics, size, .. } = observations;
+        let visible =
+            visible_points(points_in_world, poses, intrinsics, *size, &config.pseudo_render);
         let pixels = host_pixels(&projection.pixels);
         let comparable = (1..frames.len())
             .into_par_iter()
@@ -103,7 +107,9 @@ fn pairs(
                 Reduction::Sum => [1.0; 2],
                 Reduction::Mean => [silhouette.pixels.len(), visible.len()].map(|n| 1.0 / n as f32),
             };
-            Some((f, silhouette_pairs(silhouette, &pixels[f], visible, weights, tolerances)))
+            let to_outline = config.silhouette_outline;
+            let matching = SilhouetteMatching { to_outline, weights, tolerances };
+            Some((f, silhouette_pairs(silhouette, &pixels[f], visible, &matching)))
         })
         .collect()
 }

@@ -12,7 +12,7 @@ use super::{
 use crate::{
     host::index_tensor,
     loss::{charbonnier, silhouette_distances},
-    pseudo_render::PseudoRenderConfig,
+    pseudo_render::{Footprint, PseudoRenderConfig},
 };
 
 /// How terms add up over points, pixels and frames.
@@ -51,6 +51,8 @@ pub struct ObjectiveConfig {
     /// How much both tolerances grow with each pixel of blur, in pixels: what is seen coarsely need
     /// only fit coarsely.
     pub tolerance_per_blur: f32,
+    /// Measure to the silhouette's outline, to a fraction of a pixel, instead of to pixels' centres.
+    pub silhouette_outline: bool,
     /// Let the reference frame's silhouette count, and average over L frames instead of L − 1.
     pub silhouette_of_reference: bool,
     /// Let hidden points count in the silhouette, too: they lie inside it as well, and close the
@@ -72,8 +74,9 @@ impl Default for ObjectiveConfig {
             target_occlusion: true,
             silhouette_weight: 40.0,
             coverage_tolerance: 0.3,
-            containment_tolerance: 0.5,
+            containment_tolerance: 0.0,
             tolerance_per_blur: 0.3,
+            silhouette_outline: true,
             silhouette_of_reference: true,
             silhouette_of_hidden_points: true,
             style_weight: 1.0,
@@ -96,10 +99,14 @@ impl ObjectiveConfig {
             coverage_tolerance: 0.0,
             containment_tolerance: 0.0,
             tolerance_per_blur: 0.0,
+            silhouette_outline: false,
             silhouette_of_reference: false,
             silhouette_of_hidden_points: false,
             style_weight: 0.0,
-            pseudo_render: PseudoRenderConfig::default(),
+            pseudo_render: PseudoRenderConfig {
+                footprint: Footprint::Cell,
+                ..PseudoRenderConfig::default()
+            },
         }
     }
 }
@@ -148,10 +155,12 @@ impl Objective<'_> {
     pub fn correspondences(&self, unknowns: &Unknowns, level: usize) -> Correspondences {
         let leaves = unknowns.leaves(&self.device.clone().inner());
         let points = self.shape.points(leaves.style.clone()).inner();
-        let points_in_camera = unknowns.poses(&leaves).camera_from_world(points);
+        let poses = unknowns.poses(&leaves);
+        let points_in_camera = poses.camera_from_world(points.clone());
         let projection = self.observations.intrinsics.project(points_in_camera);
         let frames = (0..unknowns.n_frames()).collect();
-        Correspondences::new(self.observations, frames, &projection, self.config, level)
+        let cloud = (points, &poses, &projection);
+        Correspondences::new(self.observations, frames, cloud, self.config, level)
     }
 
     /// The objective over the reference frame and some targets.
@@ -196,10 +205,10 @@ impl Objective<'_> {
         let frames: Vec<usize> = std::iter::once(0).chain(targets.iter().copied()).collect();
         let frame_idx = frames.iter().map(|&frame| frame as i64).collect();
         let poses = unknowns.poses(leaves).select(index_tensor(frame_idx, &points_in_world));
-        let points_in_camera = poses.camera_from_world(points_in_world);
+        let points_in_camera = poses.camera_from_world(points_in_world.clone());
         let projection = self.observations.intrinsics.project(points_in_camera);
-        let matches =
-            Correspondences::new(self.observations, frames, &projection, self.config, level);
+        let cloud = (points_in_world, &poses, &projection);
+        let matches = Correspondences::new(self.observations, frames, cloud, self.config, level);
         let pixels = projection.pixels; // [1 + t, n, 2]
         Terms {
             photometric: self.photometric(&matches, pixels.clone(), level),

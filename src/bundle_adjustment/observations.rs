@@ -10,8 +10,8 @@ use crate::{
         ColorImage, ScalarImage,
         sequence::{Frame, Sequence},
     },
-    loss::Silhouette,
     sampling::ImageTable,
+    silhouette::Silhouette,
 };
 
 /// Coverage from which on a pixel holds nothing of the background.

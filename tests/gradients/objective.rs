@@ -141,12 +141,10 @@ fn points_that_no_frame_sees_have_no_gradient() {
 fn seen_by_any_frame(unknowns: &Unknowns, config: &ObjectiveConfig) -> Vec<bool> {
     let leaves = unknowns.leaves(&DEVICE);
     let points = leaves.style.clone().reshape([1, N_POINTS as i32, 3]);
-    let points_in_camera = unknowns.poses(&leaves).camera_from_world(points);
-    let projection = sequence().intrinsics.project(points_in_camera);
+    let (poses, intrinsics) = (unknowns.poses(&leaves), sequence().intrinsics);
+    let visible = visible_points(points.inner(), &poses, &intrinsics, SIZE, &config.pseudo_render);
     let mut seen = vec![false; N_POINTS];
-    for point_idx in visible_points(&projection, SIZE, &config.pseudo_render).concat() {
-        seen[point_idx as usize] = true;
-    }
+    visible.concat().iter().for_each(|&point_idx| seen[point_idx as usize] = true);
     seen
 }
 

@@ -11,9 +11,10 @@ use object_pba::{
     chamfer::chamfer_distance,
     data::{ColorImage, ScalarImage},
     host::host_pixels,
-    loss::{Silhouette, charbonnier, silhouette_distances, silhouette_pairs},
+    loss::{SilhouetteMatching, charbonnier, silhouette_distances, silhouette_pairs},
     sampling::ImageTable,
     shape_prior::ShapePriorConfig,
+    silhouette::Silhouette,
 };
 
 use crate::{DEVICE, check_gradient, mixed, on_graph, scattered, vector};
@@ -102,11 +103,12 @@ fn silhouette_distances_to_points() {
     let silhouette = Silhouette::new(&disc).expect("a disc");
     let pixels: Vec<f64> = scattered(2 * 2 * 20, 4).iter().map(|x| 14.0 + 12.0 * x).collect();
     let everything: Vec<u32> = (0..20).collect();
-    for tolerances in [[0.0; 2], [0.9, 0.6]] {
+    for (to_outline, tolerances) in [(false, [0.0; 2]), (false, [0.9, 0.6]), (true, [0.3, 0.0])] {
+        let matching = SilhouetteMatching { to_outline, weights: [0.3, 0.7], tolerances };
         let distances = |pixels: Tensor<1>| {
             let pixels = pixels.reshape([2, 20, 2]);
             let of_frame = |(row, projected): (usize, &Vec<[f32; 2]>)| {
-                (row, silhouette_pairs(&silhouette, projected, &everything, [0.3, 0.7], tolerances))
+                (row, silhouette_pairs(&silhouette, projected, &everything, &matching))
             };
             let pairs: Vec<_> = host_pixels(&pixels).iter().enumerate().map(of_frame).collect();
             silhouette_distances(pixels, &pairs)

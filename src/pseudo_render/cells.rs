@@ -1,46 +1,20 @@
-//! Which points of a cloud a view sees (Eq. 2): the pseudo-renderer of Lin et al. 2018.
+//! Points as they are: scatter-max of inverse depth, then max-pooling (Lin et al. 2018).
 //!
-//! Points scatter their inverse depth onto an up-scaled image plane, each cell keeps the largest,
-//! and a point is visible when nothing in the cells around it lies in front. Whether a point is seen
-//! is a decision, taken outside the graph; gradients flow through the points selected by it.
+//! They up-scale the plane five times, which leaves holes between the points of a sparse cloud, through
+//! which the hidden side shows. Here its cells follow the spacing of the points.
 
 use burn::tensor::{IndexingUpdateOp, Int, Tensor, module::max_pool2d, ops::MaxPoolOptions, s};
-use serde::{Deserialize, Serialize};
 
+use super::PseudoRenderConfig;
 use crate::camera::{NEAR, Projection};
 
 /// Bound on [`nearness`].
 const MAX_NEARNESS: f32 = 4.0;
 
-/// How coarse the plane is, and how far behind the nearest point another still counts as seen.
-///
-/// Lin et al. up-scale the plane five times, which leaves holes between the points of a sparse
-/// cloud, through which the hidden side shows. Here its cells follow the spacing of the points.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct PseudoRenderConfig {
-    /// Side of a cell, in units of √(image area / N), the spacing if the points filled the image;
-    /// it grows with how much nearer than the mean the nearest points are.
-    pub cell_size: f32,
-    /// Side of the window of cells over which inverse depth is max-pooled; odd.
-    pub pool_size: usize,
-    /// How far behind the nearest point of its window a point is still seen, in world units.
-    pub depth_tolerance: f32,
-}
-
-impl Default for PseudoRenderConfig {
-    /// Against the true visibility of 12 procedural cars in 36 views of 128 × 128 (precision, recall):
-    /// 0.83, 0.84 at N = 24,576; 0.85, 0.73 at 6,144; 0.87, 0.61 at 2,048. All but one point in a
-    /// hundred lie within the tolerance of a visible surface.
-    fn default() -> Self {
-        Self { cell_size: 0.7, pool_size: 3, depth_tolerance: 0.05 }
-    }
-}
-
-/// X_p = PS(X; p): for each view, the indices of the points that it sees, in ascending order.
+/// For each view, the points that nothing in the cells around them hides.
 ///
 /// `projection` holds b views of one cloud, in images of `size` = [width, height] pixels.
-pub fn visible_points(
+pub(super) fn visible_points(
     projection: &Projection,
     size: [usize; 2],
     config: &PseudoRenderConfig,
@@ -59,7 +33,7 @@ pub fn visible_points(
     let nearest = nearest.gather(0, cells); // zero in the trash cell
     let in_frame = nearest.clone().greater_elem(0.0);
     // 1/z ≥ 1/(z_nearest + tolerance), exact for the nearest point itself.
-    let threshold = nearest.clone() / (nearest * config.depth_tolerance + 1.0);
+    let threshold = nearest.clone() / (nearest * config.cell_tolerance + 1.0);
     let visible = inverse_depth.greater_equal(threshold).bool_and(in_frame);
 
     let visible = visible.into_data().try_into_vec::<bool>().expect("a mask");
@@ -156,7 +130,7 @@ mod tests {
         let cell = |i: usize| [pixels[2 * i], pixels[2 * i + 1]].map(|x| (x / cell_size) as i32);
         let hides = |j: usize, i: usize| {
             let apart = (cell(i)[0] - cell(j)[0]).abs().max((cell(i)[1] - cell(j)[1]).abs());
-            let in_front = 1.0 / depth[i] < 1.0 / (depth[j] + config.depth_tolerance);
+            let in_front = 1.0 / depth[i] < 1.0 / (depth[j] + config.cell_tolerance);
             in_frame(j) && apart <= (config.pool_size / 2) as i32 && in_front
         };
         let n = depth.len();
@@ -176,8 +150,10 @@ mod tests {
 
     #[test]
     fn the_visible_set_matches_a_brute_force_z_buffer() {
-        for (seed, pool_size, depth_tolerance) in [(1, 1, 0.0), (2, 3, 0.0), (3, 3, 0.3)] {
-            let config = PseudoRenderConfig { cell_size: 2.0, pool_size, depth_tolerance };
+        for (seed, pool_size, cell_tolerance) in [(1, 1, 0.0), (2, 3, 0.0), (3, 3, 0.3)] {
+            let cell_size = 2.0;
+            let config =
+                PseudoRenderConfig { cell_size, pool_size, cell_tolerance, ..Default::default() };
             let projection = project(&random_points(seed));
             let expected = by_brute_force(&projection, &config);
             assert_eq!(visible_points(&projection, SIZE, &config), [expected]);
@@ -186,7 +162,7 @@ mod tests {
 
     #[test]
     fn points_at_equal_depth_are_equally_visible() {
-        let config = PseudoRenderConfig { depth_tolerance: 0.0, ..Default::default() };
+        let config = PseudoRenderConfig { cell_tolerance: 0.0, ..Default::default() };
         let projection = project(&[[0.0, 0.0, 2.0], [0.0, 0.0, 2.0], [0.0, 0.0, 2.1]]);
         assert_eq!(visible_points(&projection, SIZE, &config), [[0, 1]]);
     }

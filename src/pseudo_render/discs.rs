@@ -1,0 +1,305 @@
+//! Points as small discs, tangent to the surface that they lie on.
+//!
+//! On a plane n·X = d, inverse depth is affine in the pixel: 1/z = n·K⁻¹u / d. So a disc is an
+//! ellipse on the image plane with an inverse depth and a slope, and compares exactly with its
+//! neighbours on the same surface, however steep that is.
+
+use nalgebra::{Isometry3, Point3, Vector3};
+use rayon::prelude::*;
+
+use super::{
+    PseudoRenderConfig,
+    surface::{Patch, Surface},
+};
+use crate::camera::{Intrinsics, NEAR};
+
+/// Cells that a disc reaches at most to each side: a bound, for views from within the cloud.
+const MAX_REACH: f32 = 24.0;
+
+/// For each view, the points that no disc hides. One cloud, in the world frame.
+pub(super) fn visible_points(
+    points: &[[f32; 3]],
+    camera_from_world: &[Isometry3<f32>],
+    intrinsics: &Intrinsics,
+    size: [usize; 2],
+    config: &PseudoRenderConfig,
+) -> Vec<Vec<u32>> {
+    let points: Vec<Point3<f32>> = points.iter().map(|&point| point.into()).collect();
+    let surface = Surface::of_cloud(&points);
+    camera_from_world
+        .par_iter()
+        .map(|pose| {
+            let view = View::new(pose, intrinsics, size, &surface, &points, config);
+            view.visible_points(&points, &surface, config)
+        })
+        .collect()
+}
+
+/// A view and the plane of its cells.
+struct View<'a> {
+    camera_from_world: &'a Isometry3<f32>,
+    intrinsics: &'a Intrinsics,
+    size: [f32; 2],
+    /// Side of a cell, in pixels.
+    cell: f32,
+    columns: usize,
+    rows: usize,
+}
+
+/// A disc in an image, around its point's pixel.
+struct Disc {
+    pixel: [f32; 2],
+    /// 1/z at the pixel, and how it changes along u and v.
+    inverse_depth: f32,
+    slope: [f32; 2],
+    /// m of the ellipse m_0 δu² + 2 m_1 δu δv + m_2 δv² ≤ 1, and how far it reaches along u and v.
+    ellipse: [f32; 3],
+    reach: [f32; 2],
+}
+
+impl<'a> View<'a> {
+    fn new(
+        camera_from_world: &'a Isometry3<f32>,
+        intrinsics: &'a Intrinsics,
+        size: [usize; 2],
+        surface: &Surface,
+        points: &[Point3<f32>],
+        config: &PseudoRenderConfig,
+    ) -> Self {
+        /// No finer than this, so that the plane's memory is bounded by the image.
+        const FINEST_CELL: f32 = 0.2;
+        let center = points.iter().map(|point| point.coords).sum::<Vector3<f32>>()
+            / points.len().max(1) as f32;
+        let depth = (camera_from_world * Point3::from(center)).z.max(NEAR);
+        let spacing = surface.spacing * intrinsics.focal[0].max(intrinsics.focal[1]) / depth;
+        let size = size.map(|side| side as f32);
+        let coarsest = size[0].max(size[1]).max(1.0);
+        // Of NaN and of clouds of no extent, `max` keeps the other.
+        let cell = (config.disc_cell * spacing).max(FINEST_CELL).min(coarsest);
+        let [columns, rows] = size.map(|side| (side / cell).ceil() as usize);
+        Self { camera_from_world, intrinsics, size, cell, columns, rows }
+    }
+
+    fn visible_points(
+        &self,
+        points: &[Point3<f32>],
+        surface: &Surface,
+        config: &PseudoRenderConfig,
+    ) -> Vec<u32> {
+        let mut plane = vec![0.0f32; self.columns * self.rows];
+        // For each point, its cell and the inverse depth of its disc there.
+        let mut found = vec![(0, 0.0f32); points.len()];
+        for ((point, patch), found) in points.iter().zip(&surface.patches).zip(&mut found) {
+            if let Some(disc) = self.disc(point, patch, config.disc_radius) {
+                *found = self.splat(&disc, &mut plane);
+            }
+        }
+        let tolerance = config.disc_tolerance * surface.spacing;
+        // 1/z ≥ 1/(z_nearest + tolerance), exact for the nearest disc itself.
+        let seen = |&(cell, inverse_depth): &(usize, f32)| {
+            inverse_depth > 0.0 && inverse_depth * (1.0 + tolerance * plane[cell]) >= plane[cell]
+        };
+        (0..points.len() as u32).filter(|&i| seen(&found[i as usize])).collect()
+    }
+
+    /// `None` out of the frame or behind the camera.
+    fn disc(&self, point: &Point3<f32>, patch: &Patch, radius: f32) -> Option<Disc> {
+        let at = self.camera_from_world * point;
+        let Intrinsics { focal, center } = self.intrinsics;
+        let pixel = [0, 1].map(|axis| at[axis] / at.z * focal[axis] + center[axis]);
+        let inside = |axis: usize| pixel[axis] >= 0.0 && pixel[axis] < self.size[axis];
+        if !(at.z > NEAR && inside(0) && inside(1)) {
+            return None;
+        }
+        let normal = self.camera_from_world.rotation * patch.normal;
+        let distance = normal.dot(&at.coords);
+        let slope = [normal.x / focal[0] / distance, normal.y / focal[1] / distance];
+        // ∂X/∂u and ∂X/∂v along the plane.
+        let along = [0, 1].map(|axis| {
+            let mut lateral = at.coords * (-at.z * slope[axis]);
+            lateral[axis] += at.z / focal[axis];
+            lateral
+        });
+        let scale = (radius * patch.spacing).powi(-2);
+        let ellipse = [along[0].dot(&along[0]), along[0].dot(&along[1]), along[1].dot(&along[1])]
+            .map(|entry| scale * entry);
+        let determinant = ellipse[0] * ellipse[2] - ellipse[1] * ellipse[1];
+        let reach = [ellipse[2] / determinant, ellipse[0] / determinant]
+            .map(|squared| squared.sqrt().min(MAX_REACH * self.cell));
+        let inverse_depth = at.z.recip();
+        match reach.iter().chain(&slope).all(|value| value.is_finite()) {
+            true => Some(Disc { pixel, inverse_depth, slope, ellipse, reach }),
+            // Seen edge-on, or of no extent: only the point itself is left.
+            false => Some(Disc {
+                pixel,
+                inverse_depth,
+                slope: [0.0; 2],
+                ellipse: [0.0; 3],
+                reach: [0.0; 2],
+            }),
+        }
+    }
+
+    /// Leaves the disc on the plane; returns the cell of its point, and its inverse depth there.
+    fn splat(&self, disc: &Disc, plane: &mut [f32]) -> (usize, f32) {
+        let cells = [self.columns, self.rows];
+        let own = [0, 1].map(|axis| ((disc.pixel[axis] / self.cell) as usize).min(cells[axis] - 1));
+        let offset = |axis: usize, cell: usize| (cell as f32 + 0.5) * self.cell - disc.pixel[axis];
+        let range = |axis: usize| {
+            let low = (disc.pixel[axis] - disc.reach[axis]) / self.cell - 0.5;
+            let high = (disc.pixel[axis] + disc.reach[axis]) / self.cell - 0.5;
+            (low.ceil().max(0.0) as usize, (high + 1.0).max(0.0).min(cells[axis] as f32) as usize)
+        };
+        let (first_row, last_row) = range(1);
+        let (first, last) = range(0);
+        for row in first_row..last_row {
+            let dv = offset(1, row);
+            let (start, middle) = (disc.slope[1] * dv, 2.0 * disc.ellipse[1] * dv);
+            let room = 1.0 - disc.ellipse[2] * dv * dv;
+            for column in first..last {
+                let du = offset(0, column);
+                if (disc.ellipse[0] * du + middle) * du <= room {
+                    let value = disc.inverse_depth + start + disc.slope[0] * du;
+                    let kept = &mut plane[row * self.columns + column];
+                    *kept = kept.max(value);
+                }
+            }
+        }
+        // Its own cell's centre may lie beyond the disc, which then counts at its point.
+        let [du, dv] = [offset(0, own[0]), offset(1, own[1])];
+        let [a, b, c] = disc.ellipse;
+        let reaches = a * du * du + 2.0 * b * du * dv + c * dv * dv <= 1.0;
+        let change = if reaches { disc.slope[0] * du + disc.slope[1] * dv } else { 0.0 };
+        let (cell, value) = (own[1] * self.columns + own[0], disc.inverse_depth + change);
+        plane[cell] = plane[cell].max(value);
+        (cell, value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::keyed_rng;
+    use rand::Rng;
+
+    const SIZE: [usize; 2] = [48, 32];
+    const CAMERA: Intrinsics = Intrinsics { focal: [40.0, 42.0], center: [24.0, 16.0] };
+
+    fn in_front(points: &[[f32; 3]], config: &PseudoRenderConfig) -> Vec<u32> {
+        let pose = Isometry3::translation(0.0, 0.0, 2.0);
+        visible_points(points, &[pose], &CAMERA, SIZE, config).remove(0)
+    }
+
+    fn random(n_points: usize, seed: u64, scale: [f32; 3]) -> Vec<[f32; 3]> {
+        let mut rng = keyed_rng(seed, [0, 0]);
+        (0..n_points).map(|_| scale.map(|scale| scale * rng.random_range(-1.0..1.0f32))).collect()
+    }
+
+    /// The definition, pair by pair in f64: seen unless, where the ray through the centre of the
+    /// point's cell meets another's disc, that lies further in front than the tolerance.
+    fn by_brute_force(
+        points: &[[f32; 3]],
+        pose: &Isometry3<f32>,
+        config: &PseudoRenderConfig,
+    ) -> Vec<u32> {
+        let points: Vec<Point3<f32>> = points.iter().map(|&point| point.into()).collect();
+        let surface = Surface::of_cloud(&points);
+        let cell = f64::from(View::new(pose, &CAMERA, SIZE, &surface, &points, config).cell);
+        let ray = |[u, v]: [f64; 2]| {
+            let [[fx, fy], [cx, cy]] =
+                [CAMERA.focal, CAMERA.center].map(|pair| pair.map(f64::from));
+            Vector3::new((u - cx) / fx, (v - cy) / fy, 1.0)
+        };
+        let project = |at: &Vector3<f64>| {
+            [0, 1].map(|i| at[i] / at.z * f64::from(CAMERA.focal[i]) + f64::from(CAMERA.center[i]))
+        };
+        let placed: Vec<_> = points
+            .iter()
+            .zip(&surface.patches)
+            .map(|(point, patch)| {
+                let at: Vector3<f64> = (pose * point).coords.cast();
+                (at, (pose.rotation * patch.normal).cast::<f64>(), f64::from(patch.spacing))
+            })
+            .collect();
+        let in_frame = |at: &Vector3<f64>| {
+            let [u, v] = project(at);
+            at.z > f64::from(NEAR)
+                && (0.0..SIZE[0] as f64).contains(&u)
+                && (0.0..SIZE[1] as f64).contains(&v)
+        };
+        // Inverse depth of a disc at a pixel, if it covers that.
+        let covers = |(at, normal, spacing): &(Vector3<f64>, Vector3<f64>, f64),
+                      there: [f64; 2]| {
+            let meet = |pixel: [f64; 2]| ray(pixel) * (normal.dot(at) / normal.dot(&ray(pixel)));
+            let [u, v] = project(at);
+            let step = 1e-4;
+            let slope_u = (meet([u + step, v]) - meet([u - step, v])) / (2.0 * step);
+            let slope_v = (meet([u, v + step]) - meet([u, v - step])) / (2.0 * step);
+            let moved = slope_u * (there[0] - u) + slope_v * (there[1] - v);
+            (moved.norm() <= f64::from(config.disc_radius) * spacing).then(|| meet(there).z.recip())
+        };
+        let tolerance = f64::from(config.disc_tolerance * surface.spacing);
+        let seen = |&i: &usize| {
+            let center = project(&placed[i].0).map(|x| ((x / cell).floor() + 0.5) * cell);
+            let own = covers(&placed[i], center).unwrap_or(placed[i].0.z.recip());
+            let hides = |j: usize| {
+                in_frame(&placed[j].0)
+                    && covers(&placed[j], center)
+                        .is_some_and(|other| 1.0 / other + tolerance < 1.0 / own)
+            };
+            in_frame(&placed[i].0) && !(0..placed.len()).any(hides)
+        };
+        (0..points.len()).filter(seen).map(|i| i as u32).collect()
+    }
+
+    #[test]
+    fn the_visible_set_matches_a_brute_force_z_buffer() {
+        for (seed, disc_radius, disc_tolerance) in [(1, 1.0, 0.1), (2, 1.5, 0.5), (3, 0.5, 0.1)] {
+            let config = PseudoRenderConfig { disc_radius, disc_tolerance, ..Default::default() };
+            // Some lie out of the frame and behind the camera.
+            let points = random(500, seed, [1.6, 1.2, 2.4]);
+            let pose = Isometry3::new(Vector3::new(0.1, 0.0, 2.0), Vector3::new(0.3, -0.5, 0.2));
+            let found = visible_points(&points, &[pose], &CAMERA, SIZE, &config).remove(0);
+            assert!(found.len() > 20, "{}", found.len());
+            assert_eq!(found, by_brute_force(&points, &pose, &config));
+        }
+    }
+
+    #[test]
+    fn a_plane_hides_none_of_its_points_however_it_is_tilted() {
+        let flat = random(2000, 4, [0.4, 0.4, 0.0]);
+        for degrees in [0.0f32, 40.0, 75.0, 84.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let tilted: Vec<_> = flat.iter().map(|[x, y, _]| [x * cos, *y, x * sin]).collect();
+            let n_seen = in_front(&tilted, &PseudoRenderConfig::default()).len();
+            assert!(n_seen >= 1980, "{n_seen} of 2000 at {degrees} degrees");
+        }
+    }
+
+    #[test]
+    fn a_sphere_hides_its_far_side() {
+        let mut points = random(40_000, 5, [1.0; 3]);
+        points.retain(|p| (0.01..1.0).contains(&Vector3::from(*p).norm()));
+        let points: Vec<[f32; 3]> =
+            points.iter().map(|p| (Vector3::from(*p).normalize() * 0.5).into()).collect();
+        // The tangent cone from (0, 0, −2) touches at z = −r²/2.
+        let is_near = |i: usize| points[i][2] <= -0.125;
+        let found = in_front(&points, &PseudoRenderConfig::default());
+        let n_right = found.iter().filter(|&&i| is_near(i as usize)).count();
+        let n_near = (0..points.len()).filter(|&i| is_near(i)).count();
+        assert!(n_right as f32 > 0.97 * found.len() as f32, "{n_right} of {}", found.len());
+        assert!(n_right as f32 > 0.97 * n_near as f32, "{n_right} of {n_near}");
+    }
+
+    #[test]
+    fn points_at_equal_depth_are_equally_visible() {
+        let config = PseudoRenderConfig { disc_tolerance: 0.0, ..Default::default() };
+        assert_eq!(in_front(&[[0.0; 3], [0.0; 3], [0.0, 0.0, 0.1]], &config), [0, 1]);
+    }
+
+    #[test]
+    fn nothing_is_visible_behind_the_camera_or_out_of_the_frame() {
+        let points = [[0.0, 0.0, -4.0], [9.0, 0.0, 0.0], [0.0, f32::NAN, 1.0]];
+        assert!(in_front(&points, &PseudoRenderConfig::default()).is_empty());
+    }
+}

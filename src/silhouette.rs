@@ -1,0 +1,176 @@
+//! One frame's silhouette: its pixels, as Eq. 5 counts them, and its outline, to a fraction of one.
+
+use crate::{data::ScalarImage, nearest_neighbours::NearestNeighbours};
+
+/// Coverage above which a location belongs to the object.
+pub const MASK_THRESHOLD: f32 = 0.5;
+/// Samples of the outline along each of its segments, which are about a pixel long.
+const SAMPLES_PER_SEGMENT: usize = 4;
+
+/// The object in one frame, ready to be matched with projected points.
+pub struct Silhouette {
+    /// U_l1: centres of the pixels inside.
+    pub pixels: Vec<[f32; 2]>,
+    /// Where coverage crosses one half, sampled about every quarter of a pixel.
+    pub outline: Vec<[f32; 2]>,
+    coverage: ScalarImage,
+    pixel_search: NearestNeighbours,
+    outline_search: Option<NearestNeighbours>,
+}
+
+impl Silhouette {
+    /// `None` when no pixel of the mask belongs to the object.
+    pub fn new(mask: &ScalarImage) -> Option<Self> {
+        let pixels: Vec<_> = mask
+            .enumerate_pixels()
+            .filter(|(_, _, coverage)| coverage[0] > MASK_THRESHOLD)
+            .map(|(u, v, _)| [u as f32 + 0.5, v as f32 + 0.5])
+            .collect();
+        if pixels.is_empty() {
+            return None;
+        }
+        let outline = outline(mask);
+        let search = |points: &[[f32; 2]]| NearestNeighbours::in_plane(points.iter().copied());
+        Some(Self {
+            pixel_search: search(&pixels),
+            outline_search: (!outline.is_empty()).then(|| search(&outline)),
+            pixels,
+            outline,
+            coverage: mask.clone(),
+        })
+    }
+
+    /// The weight of an outline's sample, where a pixel's is 1: they lie that much closer.
+    pub const OUTLINE_WEIGHT: f32 = 1.0 / SAMPLES_PER_SEGMENT as f32;
+
+    /// The centre of the silhouette's pixel nearest to a location: its own pixel's, when inside.
+    pub fn nearest_pixel(&self, location: [f32; 2]) -> [f32; 2] {
+        let [u, v] = location;
+        let (width, height) = self.coverage.dimensions();
+        let in_frame = u >= 0.0 && v >= 0.0 && u < width as f32 && v < height as f32;
+        match in_frame && self.coverage.get_pixel(u as u32, v as u32)[0] > MASK_THRESHOLD {
+            true => [u.floor() + 0.5, v.floor() + 0.5],
+            false => self.pixels[self.pixel_search.nearest_pixel(location) as usize],
+        }
+    }
+
+    /// The location itself where it is inside, else the nearest of the outline.
+    ///
+    /// Beyond the frame, the coverage of its border goes on: nothing is known there.
+    pub fn nearest_inside(&self, location: [f32; 2]) -> [f32; 2] {
+        match &self.outline_search {
+            Some(search) if self.coverage_at(location) <= MASK_THRESHOLD => {
+                self.outline[search.nearest_pixel(location) as usize]
+            }
+            _ => location,
+        }
+    }
+
+    /// Coverage between pixel centres, bilinearly.
+    fn coverage_at(&self, [u, v]: [f32; 2]) -> f32 {
+        let (width, height) = self.coverage.dimensions();
+        let axis = |location: f32, side: u32| {
+            let at = (location - 0.5).clamp(0.0, (side - 1) as f32);
+            (at as u32, (at as u32 + 1).min(side - 1), at.fract())
+        };
+        let ((x, right, fx), (y, below, fy)) = (axis(u, width), axis(v, height));
+        let at = |x: u32, y: u32| self.coverage.get_pixel(x, y)[0];
+        let [above, below] = [y, below].map(|y| at(x, y) + fx * (at(right, y) - at(x, y)));
+        above + fy * (below - above)
+    }
+}
+
+/// Marching squares over the pixel centres.
+fn outline(mask: &ScalarImage) -> Vec<[f32; 2]> {
+    let (width, height) = mask.dimensions();
+    let squares = (1..height).flat_map(|v| (1..width).map(move |u| (u - 1, v - 1)));
+    squares.flat_map(|(u, v)| crossings(mask, u, v)).flat_map(samples).collect()
+}
+
+/// The segments of the outline within the square whose first corner is the centre of pixel (u, v).
+fn crossings(mask: &ScalarImage, u: u32, v: u32) -> Vec<[[f32; 2]; 2]> {
+    let corners = [(u, v), (u + 1, v), (u + 1, v + 1), (u, v + 1)];
+    let mut found = Vec::new();
+    for (i, &(u, v)) in corners.iter().enumerate() {
+        let (next_u, next_v) = corners[(i + 1) % 4];
+        let [here, next] =
+            [(u, v), (next_u, next_v)].map(|(u, v)| mask.get_pixel(u, v)[0] - MASK_THRESHOLD);
+        if (here > 0.0) != (next > 0.0) {
+            let share = here / (here - next);
+            let between = |a: u32, b: u32| a as f32 + 0.5 + share * (b as f32 - a as f32);
+            found.push([between(u, next_u), between(v, next_v)]);
+        }
+    }
+    // Two crossings, or four around a saddle, of which neighbours belong together.
+    found.chunks_exact(2).map(|ends| [ends[0], ends[1]]).collect()
+}
+
+/// Evenly spread along a segment.
+fn samples([start, end]: [[f32; 2]; 2]) -> impl Iterator<Item = [f32; 2]> {
+    (0..SAMPLES_PER_SEGMENT).map(move |k| {
+        let share = (k as f32 + 0.5) / SAMPLES_PER_SEGMENT as f32;
+        [0, 1].map(|axis| start[axis] + share * (end[axis] - start[axis]))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Luma;
+
+    /// A disc about (16.3, 15.6) whose rim covers pixels in part.
+    const CENTER: [f32; 2] = [16.3, 15.6];
+    const RADIUS: f32 = 9.0;
+
+    fn from_center([u, v]: [f32; 2]) -> f32 {
+        (u - CENTER[0]).hypot(v - CENTER[1])
+    }
+
+    fn disc() -> Silhouette {
+        let mask = ScalarImage::from_fn(32, 32, |u, v| {
+            let samples = (0..64).map(|k| {
+                [u as f32 + (k % 8) as f32 / 8.0 + 0.0625, v as f32 + (k / 8) as f32 / 8.0 + 0.0625]
+            });
+            Luma([samples.filter(|&at| from_center(at) < RADIUS).count() as f32 / 64.0])
+        });
+        Silhouette::new(&mask).expect("a disc")
+    }
+
+    #[test]
+    fn the_outline_of_a_disc_is_its_circle_to_a_tenth_of_a_pixel() {
+        let outline = disc().outline;
+        assert!(outline.len() as f32 > 3.0 * std::f32::consts::TAU * RADIUS);
+        for at in outline {
+            assert!((from_center(at) - RADIUS).abs() < 0.1, "{at:?}");
+        }
+    }
+
+    #[test]
+    fn locations_inside_stay_and_others_move_to_the_outline() {
+        let disc = disc();
+        for k in 0..200 {
+            let (turn, radius) = (k as f32, 0.1 * k as f32);
+            let at = [CENTER[0] + radius * turn.cos(), CENTER[1] + radius * turn.sin()];
+            let [u, v] = disc.nearest_inside(at);
+            let moved = (u - at[0]).hypot(v - at[1]);
+            assert!((moved - (radius - RADIUS).max(0.0)).abs() < 0.15, "{at:?} moved by {moved}");
+        }
+    }
+
+    #[test]
+    fn an_object_cut_by_the_frame_goes_on_beyond_it() {
+        let mask = ScalarImage::from_fn(8, 6, |u, _| Luma([if u < 4 { 1.0 } else { 0.0 }]));
+        let half = Silhouette::new(&mask).expect("half a frame");
+        assert_eq!(half.nearest_inside([-3.0, 2.0]), [-3.0, 2.0]);
+        assert_eq!(half.nearest_inside([6.0, 2.6])[0], 4.0);
+        let full = Silhouette::new(&ScalarImage::from_pixel(4, 4, Luma([1.0]))).expect("full");
+        assert!(full.outline.is_empty());
+        assert_eq!(full.nearest_inside([9.0, 9.0]), [9.0, 9.0]);
+    }
+
+    #[test]
+    fn an_empty_mask_has_no_silhouette() {
+        assert!(Silhouette::new(&ScalarImage::new(4, 4)).is_none());
+        assert!(Silhouette::new(&ScalarImage::new(0, 0)).is_none());
+    }
+}
