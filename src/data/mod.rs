@@ -4,7 +4,11 @@
 //! diagonal 1. Cameras follow OpenCV (x right, y down, z forward).
 
 pub mod mesh;
-pub mod obj;
+pub mod mesh_file;
+mod obj;
+mod glb;
+mod ply_mesh;
+mod off;
 pub mod shapenet;
 pub mod surface;
 pub mod procedural;

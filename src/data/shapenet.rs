@@ -12,7 +12,7 @@ use std::{
 
 use nalgebra::Point3;
 
-use super::obj::{Loaded, read_obj};
+use super::mesh_file::{Loaded, read_mesh};
 use crate::{Error, Result};
 
 /// The synset of cars.
@@ -71,7 +71,7 @@ pub fn select_models(mut models: Vec<Model>, include: &[String], exclude: &[Stri
 impl Model {
     /// Reads the mesh into the world frame: up +Y, front −Z, box centred, unit diagonal.
     pub fn load(&self) -> Result<Loaded> {
-        let mut loaded = read_obj(&self.path)?;
+        let mut loaded = read_mesh(&self.path)?;
         if self.layout == Layout::V1 {
             for vertex in &mut loaded.mesh.vertices {
                 *vertex = v2_from_v1(*vertex);
