@@ -9,6 +9,7 @@ mod obj;
 mod glb;
 mod ply_mesh;
 mod off;
+pub mod collection;
 pub mod shapenet;
 pub mod surface;
 pub mod procedural;
