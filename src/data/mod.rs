@@ -12,6 +12,7 @@ mod off;
 pub mod collection;
 pub mod shapenet;
 pub mod surface;
+pub mod surface_cache;
 pub mod procedural;
 pub mod texture;
 pub mod lighting;
