@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use gltf::{Accessor, Primitive, Semantic, image::Source, texture::Info};
+use gltf::{Accessor, Primitive, Semantic, texture::Info};
 use image::RgbImage;
 
 use super::{File, accessors::slice};
@@ -88,7 +88,7 @@ impl<'a> Materials<'a> {
         if let Some(&texture) = self.decoded.get(&picture.index()) {
             return texture;
         }
-        let image = self.picture_bytes(&picture.source()).and_then(|bytes| decode_texture(&bytes));
+        let image = self.picture_bytes(picture.index()).and_then(|bytes| decode_texture(&bytes));
         let texture = match image {
             Ok(image) => {
                 self.textures.push(image);
@@ -103,17 +103,18 @@ impl<'a> Materials<'a> {
         texture
     }
 
-    fn picture_bytes(&self, source: &Source) -> Result<Vec<u8>, String> {
-        match source {
-            Source::Uri { uri, .. } => self.file.fetch(uri),
-            Source::View { view, .. } => self
-                .file
-                .buffers
-                .get(view.buffer().index())
-                .and_then(|buffer| slice(buffer, view.offset(), view.length()))
-                .map(<[u8]>::to_vec)
-                .ok_or("it leaves its buffer".into()),
+    fn picture_bytes(&self, picture_idx: usize) -> Result<Vec<u8>, String> {
+        // `Image::source` would panic where the document leaves out the type.
+        let document = &self.file.gltf.document;
+        let picture = &document.as_json().images[picture_idx];
+        if let Some(uri) = &picture.uri {
+            return self.file.fetch(uri);
         }
+        let view = picture.buffer_view.and_then(|view| document.views().nth(view.value()));
+        let view = view.ok_or("it has neither a URI nor a buffer")?;
+        let buffer = self.file.buffers.get(view.buffer().index());
+        let bytes = buffer.and_then(|buffer| slice(buffer, view.offset(), view.length()));
+        bytes.map(<[u8]>::to_vec).ok_or("it leaves its buffer".into())
     }
 }
 

@@ -9,7 +9,7 @@ mod tests;
 
 use std::{fs, path::Path};
 
-use gltf::{Gltf, Node, Primitive, Semantic, buffer, mesh::Mode};
+use gltf::{Document, Gltf, Node, Primitive, Semantic, buffer, mesh::Mode};
 use nalgebra::{Matrix4, Point3};
 
 use self::materials::Materials;
@@ -58,7 +58,17 @@ impl<'a> File<'a> {
         if bytes.starts_with(b"glTF") && stated.map_or(0, u32::from_le_bytes) < 12 {
             return Err("its header is broken".into());
         }
-        let gltf = Gltf::from_slice(bytes).map_err(|error| error.to_string())?;
+        let Gltf { document, blob } =
+            Gltf::from_slice_without_validation(bytes).map_err(|error| error.to_string())?;
+        let root = document.into_json();
+        // The crate's validation looks up positions before it checks that they are there.
+        let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+        let mut accessors = primitives.flat_map(|primitive| primitive.attributes.values());
+        if accessors.any(|accessor| accessor.value() >= root.accessors.len()) {
+            return Err("a primitive names an accessor that does not exist".into());
+        }
+        let document = Document::from_json(root).map_err(|error| error.to_string())?;
+        let gltf = Gltf { document, blob };
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut file = Self { gltf, buffers: Vec::new(), folder };
         for buffer in file.gltf.buffers() {

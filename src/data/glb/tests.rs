@@ -143,6 +143,8 @@ fn broken_documents_are_refused() {
     check_refused(&json!({}), "");
     check_refused(&with("/scenes", json!([])), "");
     check_refused(&with("/nodes/0/mesh", json!(7)), "");
+    let positions = "/meshes/0/primitives/0/attributes/POSITION";
+    check_refused(&with(positions, json!(7)), "an accessor that does not exist");
     check_refused(&with("/accessors/1/count", json!(0)), "");
     check_refused(&with("/accessors/1/count", json!(5)), "accessor 1 is empty, or leaves");
     check_refused(&with("/accessors/1/count", json!(u64::MAX)), "accessor 1");

@@ -1,5 +1,6 @@
 use super::*;
-use crate::data::mesh::Triangle;
+use crate::data::{keyed_rng, mesh::Triangle};
+use rand::Rng;
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
@@ -56,6 +57,31 @@ fn a_texture_lies_the_same_in_every_format() {
             assert_eq!(triangle.uvs, expected.uvs);
             assert_eq!(triangle.texture, Some(0));
             assert!(triangle.color.iter().all(|channel| (channel - 1.0).abs() < 1e-6));
+        }
+    }
+}
+
+#[test]
+fn damaged_files_are_read_or_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for entry in fs::read_dir(fixture("formats")).expect("the fixtures") {
+        let path = entry.expect("a fixture").path();
+        fs::copy(&path, folder.path().join(path.file_name().expect("a name"))).expect("writable");
+    }
+    for name in ["square.obj", "square.gltf", "square.glb", "car.glb", "car.ply", "car.off"] {
+        let path = folder.path().join(name);
+        let whole = fs::read(&path).expect("readable");
+        for damage in 0..100 {
+            let mut rng = keyed_rng(damage, [0, 0]);
+            let mut bytes = whole.clone();
+            // Headers hold what everything else depends on.
+            let reach = if rng.random() { bytes.len() } else { bytes.len().min(1000) };
+            for _ in 0..rng.random_range(1..4) {
+                bytes[rng.random_range(0..reach)] = rng.random();
+            }
+            fs::write(&path, &bytes).expect("writable");
+            // What is read was found usable; all that could go wrong is a panic.
+            let _ = read_mesh(&path);
         }
     }
 }
