@@ -13,6 +13,10 @@ pub enum Error {
     Image { path: PathBuf, source: image::ImageError },
     #[error("{}: not a usable mesh: {reason}", path.display())]
     Mesh { path: PathBuf, reason: String },
+    #[error("{}: not a usable collection of meshes: {reason}", path.display())]
+    Collection { path: PathBuf, reason: String },
+    #[error("{}: points cannot be kept there: {source}", path.display())]
+    Cache { path: PathBuf, source: Box<Error> },
     #[error("{}: not a usable sequence: {reason}", path.display())]
     Sequence { path: PathBuf, reason: String },
     #[error("{}: not a usable point cloud: {reason}", path.display())]

@@ -1,6 +1,12 @@
 //! The binaries, end to end: what they write, and how they refuse bad input.
 
-use std::{fs, path::Path, process::Output};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::Path,
+    process::{Output, Stdio},
+    time::{Duration, Instant},
+};
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -161,14 +167,136 @@ fn an_unknown_config_key_is_named() {
     check_refused(&output, &["typo.toml", "slover"]);
 }
 
+const BROKEN: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 nine\n";
+
+/// A folder of `n` boxes of different lengths, as plain meshes.
+fn boxes(n: usize) -> TempDir {
+    let folder = TempDir::new().unwrap();
+    for idx in 0..n {
+        let z = 2.0 + 0.1 * idx as f64;
+        let lid = |y: u8| format!("v 0 {y} 0\nv 1 {y} 0\nv 1 {y} {z}\nv 0 {y} {z}\n");
+        let faces = "f 1 2 3 4\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+        let text = format!("{}{}{faces}", lid(0), lid(1));
+        fs::write(folder.path().join(format!("box_{idx:02}.obj")), text).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn inspecting_a_collection_counts_draws_and_lists_what_failed() {
+    let meshes = boxes(5);
+    fs::write(meshes.path().join("broken.obj"), BROKEN).unwrap();
+    let out = meshes.path().join("out");
+    let [folder, out] = [meshes.path(), &out].map(|path| path.to_str().unwrap());
+    let output = pba_train(&["inspect", folder, "--out", out]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = String::from_utf8_lossy(&output.stdout);
+    for part in ["6 models, 5 of them usable", "z (5)", "unusable      1", "broken.obj", "line 4"] {
+        assert!(table.contains(part), "{table} does not say {part:?}");
+    }
+
+    let report = fs::read_to_string(Path::new(out).join("inspect.json")).unwrap();
+    let report: Value = serde_json::from_str(&report).unwrap();
+    let models = report["models"].as_array().unwrap();
+    let triangles: Vec<_> = models.iter().map(|model| model["n_triangles"].as_u64()).collect();
+    assert_eq!(triangles, [Some(12); 5]);
+    assert_eq!(models[4]["tile"], serde_json::json!([2, 2]));
+    assert_eq!(report["unusable"][0]["id"], "broken");
+
+    // Three columns, two rows, and a box in the middle of each tile but the last.
+    let sheet = image::open(Path::new(out).join("contact_sheet.png")).unwrap().to_rgb8();
+    let (side, paper) = (sheet.width() / 3, sheet.get_pixel(0, 0));
+    assert_eq!(sheet.height(), 2 * side);
+    for tile in 0..6 {
+        let centre = sheet.get_pixel((tile % 3) * side + side / 2, (tile / 3) * side + side / 2);
+        assert_eq!(centre == paper, tile == 5, "tile {tile}");
+    }
+}
+
+#[test]
+fn axes_that_are_parallel_are_refused() {
+    let meshes = boxes(1);
+    let folder = meshes.path().to_str().unwrap();
+    let output = pba_train(&["inspect", folder, "--up", "z", "--front", "-z"]);
+    check_refused(&output, &["up is z", "front cannot be -z"]);
+}
+
+#[test]
+fn rendering_skips_and_lists_what_cannot_be_read() {
+    let meshes = boxes(2);
+    fs::write(meshes.path().join("broken.obj"), BROKEN).unwrap();
+    let out = TempDir::new().unwrap();
+    let config = meshes.path().join("short.toml");
+    fs::write(&config, "n_frames = 2\n").unwrap();
+    let render = |include: &str| {
+        let [folder, out, config] =
+            [meshes.path(), out.path(), &config].map(|path| path.to_str().unwrap());
+        let arguments = ["render", "--meshes", folder, "--out", out, "--config", config];
+        pba_train(&[&arguments[..], &["--include", include]].concat())
+    };
+    let output = render("*");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    assert!(message.contains("skipped: ") && message.contains("broken.obj"), "{message}");
+    assert!(out.path().join("box_00-0/transforms.json").is_file());
+    assert!(out.path().join("box_01-0/transforms.json").is_file());
+    check_refused(&render("broken"), &["broken.obj", "line 4"]);
+}
+
+/// A run that trains for one step on `meshes`, with many points to sample.
+fn training_on(meshes: &Path, out: &Path, cache: &Path) -> std::process::Command {
+    let tiny = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/tiny.toml");
+    let text = fs::read_to_string(tiny).unwrap();
+    let text = text.replace("points_per_model = 1024", "points_per_model = 100000");
+    let text = text.replace("steps = 40", "steps = 1");
+    let config = meshes.join("one-step.toml");
+    fs::write(&config, text).unwrap();
+    let mut command = std::process::Command::new(assert_cmd::cargo::cargo_bin("pba-train"));
+    command.arg("prior").arg("--config").arg(config).arg("--meshes").arg(meshes);
+    command.arg("--out").arg(out).arg("--cache").arg(cache);
+    command
+}
+
+fn contents(folder: &Path) -> BTreeMap<std::ffi::OsString, Vec<u8>> {
+    let entries = fs::read_dir(folder).unwrap().map(Result::unwrap);
+    entries.map(|entry| (entry.file_name(), fs::read(entry.path()).unwrap())).collect()
+}
+
+#[test]
+fn a_cache_of_points_survives_a_killed_run_byte_for_byte() {
+    let meshes = boxes(21);
+    fs::write(meshes.path().join("broken.obj"), BROKEN).unwrap();
+    let folder = TempDir::new().unwrap();
+    let [whole, killed, run_a, run_b] =
+        ["whole", "killed", "run_a", "run_b"].map(|name| folder.path().join(name));
+    let output = training_on(meshes.path(), &run_a, &whole).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    assert!(message.contains("skipped: ") && message.contains("broken.obj"), "{message}");
+    let expected = contents(&whole);
+    assert!(expected.len() >= 20, "{}", expected.len());
+
+    let mut child =
+        training_on(meshes.path(), &run_b, &killed).stderr(Stdio::null()).spawn().unwrap();
+    let start = Instant::now();
+    while fs::read_dir(&killed).map_or(0, Iterator::count) < 3 {
+        assert!(start.elapsed() < Duration::from_secs(60), "nothing is kept");
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(training_on(meshes.path(), &run_b, &killed).output().unwrap().status.success());
+    assert!(contents(&killed) == expected, "the caches differ");
+    let weights = |run: &Path| fs::read(run.join("prior.safetensors")).unwrap();
+    assert!(weights(&run_a) == weights(&run_b), "the weights differ");
+}
+
 #[test]
 fn a_broken_mesh_is_refused_with_its_file_and_line() {
     let root = TempDir::new().unwrap();
     for id in 0..6 {
         let model = root.path().join(format!("02958343/broken_{id}/models"));
         fs::create_dir_all(&model).unwrap();
-        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 nine\n";
-        fs::write(model.join("model_normalized.obj"), text).unwrap();
+        fs::write(model.join("model_normalized.obj"), BROKEN).unwrap();
     }
     let out = root.path().join("out");
     let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/tiny.toml");
@@ -176,7 +304,7 @@ fn a_broken_mesh_is_refused_with_its_file_and_line() {
         "prior",
         "--config",
         config.to_str().unwrap(),
-        "--shapenet",
+        "--meshes",
         root.path().to_str().unwrap(),
         "--out",
         out.to_str().unwrap(),

@@ -3,21 +3,26 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Args, Parser, Subcommand};
+use inspect::InspectArguments;
 use object_pba::{
-    Result,
+    Error, Result,
     device::Backend,
     training::{TrainingConfig, train_regressors, train_shape_prior},
 };
 use render::RenderArguments;
+use selection::SelectionArguments;
 
+mod inspect;
 mod render;
+mod selection;
 
 /// Large tensors come and go with every operation; the system's allocator returns each one's pages
 /// to the kernel and faults them in again, which doubles a training step.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// Trains a shape prior and its regressors, and renders sequences to try them on.
+/// Looks at meshes, trains a shape prior and its regressors on them, and renders sequences to try
+/// these on.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {
@@ -27,6 +32,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Summarise a collection of meshes before hours are spent on it.
+    Inspect(InspectArguments),
     /// Train the autoencoder of shapes.
     Prior(Arguments),
     /// Train the style and pose regressors, on a finished prior.
@@ -51,22 +58,19 @@ struct Arguments {
     /// Replaces the config's seed.
     #[arg(long)]
     seed: Option<u64>,
-    /// Folder of ShapeNetCore, v1 or v2; without it, shapes are procedural cars.
+    /// Folder of meshes: ShapeNetCore v1 or v2, or any; without it, shapes are procedural cars.
+    #[arg(long, alias = "shapenet")]
+    meshes: Option<PathBuf>,
+    /// Folder that keeps the sampled points of meshes for later runs.
     #[arg(long)]
-    shapenet: Option<PathBuf>,
-    /// Category within it.
-    #[arg(long)]
-    synset: Option<String>,
-    /// Take only model ids like this, `*` standing for anything; may be repeated.
-    #[arg(long, value_name = "PATTERN")]
-    include: Vec<String>,
-    /// Leave out model ids like this; may be repeated.
-    #[arg(long, value_name = "PATTERN")]
-    exclude: Vec<String>,
+    cache: Option<PathBuf>,
+    #[command(flatten)]
+    selection: SelectionArguments,
 }
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
+        Command::Inspect(arguments) => inspect::inspect(&arguments),
         Command::Prior(arguments) => train(&arguments, true, false),
         Command::Regressors(arguments) => train(&arguments, false, true),
         Command::All(arguments) => train(&arguments, true, true),
@@ -98,11 +102,19 @@ impl Arguments {
     fn config(&self) -> Result<TrainingConfig> {
         let mut config = TrainingConfig::read(&self.config)?;
         config.seed = self.seed.unwrap_or(config.seed);
-        let data = &mut config.data;
-        data.shapenet = self.shapenet.clone().or(data.shapenet.take());
-        data.synset = self.synset.clone().unwrap_or_else(|| data.synset.clone());
-        data.include.extend(self.include.iter().cloned());
-        data.exclude.extend(self.exclude.iter().cloned());
+        let (data, selection) = (&mut config.data, &self.selection);
+        data.meshes = self.meshes.clone().or(data.meshes.take());
+        data.cache = self.cache.clone().or(data.cache.take());
+        if !selection.synset.is_empty() {
+            data.synset = selection.synset.join(",");
+        }
+        data.split = selection.split.or(data.split);
+        data.up = selection.up.or(data.up);
+        data.front = selection.front.or(data.front);
+        data.include.extend(selection.include.iter().cloned());
+        data.exclude.extend(selection.exclude.iter().cloned());
+        let invalid = |reason| Error::Config { path: self.config.clone(), reason };
+        config.check().map_err(invalid)?;
         Ok(config)
     }
 }

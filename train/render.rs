@@ -8,14 +8,17 @@ use object_pba::{
     Error, Result,
     config::{read_config, write_config},
     data::{
+        collection::{Collection, Model},
         formats::nerfstudio::write_sequence,
         mesh::Mesh,
         procedural,
         sequence::{Sequence, SequenceOptions},
-        shapenet::{CARS, Model, find_models, select_models},
+        shapenet::CARS,
     },
 };
 use rayon::prelude::*;
+
+use crate::selection::SelectionArguments;
 
 /// What to render, and where to.
 #[derive(Args)]
@@ -23,18 +26,11 @@ pub struct RenderArguments {
     /// Folder of the dataset: one folder a sequence, named `model-0`, `model-1`, and so on.
     #[arg(long)]
     out: PathBuf,
-    /// Folder of ShapeNetCore, v1 or v2; without it, shapes are procedural cars.
-    #[arg(long)]
-    shapenet: Option<PathBuf>,
-    /// Category within it.
-    #[arg(long, default_value = CARS)]
-    synset: String,
-    /// Take only model ids like this, `*` standing for anything; may be repeated.
-    #[arg(long, value_name = "PATTERN")]
-    include: Vec<String>,
-    /// Leave out model ids like this; may be repeated.
-    #[arg(long, value_name = "PATTERN")]
-    exclude: Vec<String>,
+    /// Folder of meshes: ShapeNetCore v1 or v2, or any; without it, shapes are procedural cars.
+    #[arg(long, alias = "shapenet")]
+    meshes: Option<PathBuf>,
+    #[command(flatten)]
+    selection: SelectionArguments,
     /// How many procedural cars; they are none of those that training draws.
     #[arg(long, default_value_t = 20)]
     models: u64,
@@ -51,7 +47,7 @@ pub struct RenderArguments {
 
 enum Shape {
     Procedural(u64),
-    ShapeNet(Model),
+    Model(Model),
 }
 
 pub fn render(arguments: &RenderArguments) -> Result<()> {
@@ -63,37 +59,43 @@ pub fn render(arguments: &RenderArguments) -> Result<()> {
     std::fs::create_dir_all(&arguments.out).map_err(Error::io(&arguments.out))?;
     write_config(&arguments.out.join("config.toml"), &options)?;
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} models (ETA {eta})");
-    shapes
+    let skipped: Vec<Option<Error>> = shapes
         .par_iter()
         .enumerate()
         .progress_with_style(style.expect("a valid template"))
-        .try_for_each(|(idx, shape)| {
-            let (id, mesh) = shape.load()?;
-            write_sequences(&id, &mesh, idx as u64, arguments, &options)
-        })?;
-    println!("{} models, {} sequences of each", shapes.len(), arguments.sequences);
+        .map(|(idx, shape)| match shape.load() {
+            Ok((id, mesh)) => {
+                write_sequences(&id, &mesh, idx as u64, arguments, &options).map(|()| None)
+            }
+            Err(error) => Ok(Some(error)),
+        })
+        .collect::<Result<_>>()?;
+    let n_models = skipped.iter().filter(|error| error.is_none()).count();
+    let skipped: Vec<_> = skipped.into_iter().flatten().collect();
+    skipped.iter().for_each(|error| eprintln!("skipped: {error}"));
+    if let Some(error) = skipped.into_iter().next().filter(|_| n_models == 0) {
+        return Err(error);
+    }
+    println!("{n_models} models, {} sequences of each", arguments.sequences);
     Ok(())
 }
 
 fn shapes(arguments: &RenderArguments) -> Result<Vec<Shape>> {
-    let Some(root) = &arguments.shapenet else {
+    let Some(root) = &arguments.meshes else {
         let seeds = (0..arguments.models).map(|idx| arguments.seed * 1_000_000 + idx);
         return Ok(seeds.map(Shape::Procedural).collect());
     };
-    let models = find_models(root, &arguments.synset)?;
-    let models = select_models(models, &arguments.include, &arguments.exclude);
-    if models.is_empty() {
-        let reason = "no model id matches --include and --exclude".into();
-        return Err(Error::Config { path: root.clone(), reason });
-    }
-    Ok(models.into_iter().map(Shape::ShapeNet).collect())
+    let selection = arguments.selection.selection(&[CARS]);
+    let selection = selection.map_err(|reason| Error::Config { path: root.clone(), reason })?;
+    Ok(Collection::open(root, &selection)?.models.into_iter().map(Shape::Model).collect())
 }
 
 impl Shape {
     fn load(&self) -> Result<(String, Mesh)> {
         match self {
             Self::Procedural(seed) => Ok((format!("car_{seed:06}"), procedural::car(*seed))),
-            Self::ShapeNet(model) => Ok((model.id.clone(), model.load()?.mesh)),
+            // Datasets have one folder a sequence, side by side.
+            Self::Model(model) => Ok((model.id.replace('/', "_"), model.load()?.mesh)),
         }
     }
 }

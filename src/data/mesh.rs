@@ -2,6 +2,8 @@
 
 use nalgebra::{Point3, Vector3, distance};
 
+/// What has no colour of its own.
+pub const GREY: [f32; 3] = [0.7; 3];
 /// Largest coordinate that is taken for geometry, in the file's units.
 const LARGEST_COORDINATE: f32 = 1e6;
 
@@ -22,6 +24,13 @@ pub struct Triangle {
     /// Diffuse albedo, RGB in [0, 1].
     pub color: [f32; 3],
     pub texture: Option<u32>,
+}
+
+impl Triangle {
+    /// One colour, and no texture.
+    pub fn plain(vertices: [u32; 3], color: [f32; 3]) -> Self {
+        Self { vertices, uvs: [[0.0; 2]; 3], color, texture: None }
+    }
 }
 
 /// An axis-aligned box.
@@ -98,13 +107,9 @@ impl Mesh {
         if self.triangles.is_empty() {
             return Err("it has no triangles".into());
         }
-        let usable = |x: f32| x.abs() <= LARGEST_COORDINATE; // false for NaN
-        if let Some(idx) = self.vertices.iter().position(|v| !v.iter().all(|&x| usable(x))) {
-            return Err(format!(
-                "vertex {} is not finite or huge: {}",
-                idx + 1,
-                self.vertices[idx]
-            ));
+        for (idx, &vertex) in self.vertices.iter().enumerate() {
+            checked_vertex(vertex.into())
+                .map_err(|reason| format!("vertex {}: {reason}", idx + 1))?;
         }
         for (idx, triangle) in self.triangles.iter().enumerate() {
             if triangle.vertices.iter().any(|&vertex| vertex as usize >= self.vertices.len()) {
@@ -113,7 +118,7 @@ impl Mesh {
             if triangle.texture.is_some_and(|texture| texture as usize >= self.textures.len()) {
                 return Err(format!("triangle {} names a texture that does not exist", idx + 1));
             }
-            if !triangle.uvs.iter().flatten().all(|&coordinate| usable(coordinate)) {
+            if !triangle.uvs.iter().flatten().all(|&coordinate| is_usable(coordinate)) {
                 return Err(format!("triangle {} has unusable texture coordinates", idx + 1));
             }
         }
@@ -127,16 +132,36 @@ impl Mesh {
     }
 }
 
+/// A vertex, unless its coordinates are no geometry.
+pub fn checked_vertex(coordinates: [f32; 3]) -> Result<Point3<f32>, String> {
+    match coordinates.iter().find(|coordinate| !is_usable(**coordinate)) {
+        None => Ok(Point3::from(coordinates)),
+        Some(coordinate) => Err(format!("coordinate {coordinate} is not finite, or huge")),
+    }
+}
+
+/// A polygon's triangles: a fan about its first corner, which fills it where it is convex.
+pub fn fan<T: Copy>(corners: &[T]) -> impl Iterator<Item = [T; 3]> {
+    corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]])
+}
+
+/// The one colour of a triangle whose corners have three.
+pub fn mean_color(corners: [[f32; 3]; 3]) -> [f32; 3] {
+    std::array::from_fn(|c| corners.iter().map(|color| color[c]).sum::<f32>() / 3.0)
+}
+
+fn is_usable(coordinate: f32) -> bool {
+    coordinate.abs() <= LARGEST_COORDINATE // false for NaN
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn triangle_mesh(corners: [[f32; 3]; 3]) -> Mesh {
-        let triangle =
-            Triangle { vertices: [0, 1, 2], uvs: [[0.0; 2]; 3], color: [0.5; 3], texture: None };
         Mesh {
             vertices: corners.map(Point3::from).to_vec(),
-            triangles: vec![triangle],
+            triangles: vec![Triangle::plain([0, 1, 2], GREY)],
             textures: vec![],
         }
     }
@@ -181,6 +206,14 @@ mod tests {
         let mut dangling = triangle_mesh([[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]]);
         dangling.triangles[0].vertices[2] = 3;
         check_refused(&dangling, "does not exist");
+    }
+
+    #[test]
+    fn a_polygon_becomes_a_fan() {
+        let triangles = |n: usize| fan(&(0..n).collect::<Vec<_>>()).collect::<Vec<_>>();
+        assert_eq!(triangles(5), [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+        assert_eq!(triangles(3), [[0, 1, 2]]);
+        assert!((0..3).all(|n| triangles(n).is_empty()));
     }
 
     #[test]

@@ -4,9 +4,15 @@
 //! diagonal 1. Cameras follow OpenCV (x right, y down, z forward).
 
 pub mod mesh;
-pub mod obj;
+pub mod mesh_file;
+mod obj;
+mod glb;
+mod ply_mesh;
+mod off;
+pub mod collection;
 pub mod shapenet;
 pub mod surface;
+pub mod surface_cache;
 pub mod procedural;
 pub mod texture;
 pub mod lighting;

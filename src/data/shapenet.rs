@@ -1,116 +1,104 @@
-//! ShapeNetCore folders, versions 1 and 2.
+//! Trees of ShapeNetCore, versions 1 and 2.
 //!
 //! - v1: `synset/id/model.obj`, up +Y, front +X;
 //! - v2: `synset/id/models/model_normalized.obj`, up +Y, front −Z, origin at the vertex mean.
 //!
-//! Models are loaded into the one world frame, whichever version they come from.
+//! `all.csv` says which split each model belongs to.
+
+mod splits;
 
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-use nalgebra::Point3;
-
-use super::obj::{Loaded, read_obj};
+use self::splits::Splits;
+use super::collection::{Axes, Model, Split};
 use crate::{Error, Result};
 
 /// The synset of cars.
 pub const CARS: &str = "02958343";
+/// Where the mesh of a model lies in its folder.
+const V1_MESH: &str = "model.obj";
+const V2_MESH: &str = "models/model_normalized.obj";
 
-/// Where a model's mesh lies, and how it is oriented.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Layout {
-    V1,
-    V2,
+/// Whether a folder is such a tree: it holds synsets, or is one.
+pub fn is_tree(root: &Path) -> Result<bool> {
+    let folders = folders_in(root)?;
+    let holds_mesh = |folder: &PathBuf| [V1_MESH, V2_MESH].iter().any(|m| folder.join(m).is_file());
+    Ok(folders.iter().any(|(name, folder)| is_synset(name) || holds_mesh(folder)))
 }
 
-/// A model of a repository, not yet loaded.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Model {
-    pub synset: String,
-    pub id: String,
-    /// Its OBJ file.
-    pub path: PathBuf,
-    pub layout: Layout,
-}
-
-/// Lists the models of a synset, sorted by id. `root` holds the synset's folder, or is it.
+/// The models of some synsets, or of all if none is named, and of one split if it is.
 ///
-/// Folders without a mesh are passed over, for a few of ShapeNet's have none.
-pub fn find_models(root: &Path, synset: &str) -> Result<Vec<Model>> {
-    let below = root.join(synset);
-    let folder = if below.is_dir() { below.as_path() } else { root };
+/// A model's folder without a mesh counts, for reading it then says that it has none.
+pub fn find_models(root: &Path, synsets: &[String], split: Option<Split>) -> Result<Vec<Model>> {
+    let synset_folders = synset_folders(root, synsets)?;
+    let splits = split.map(|_| Splits::read(root)).transpose()?;
+    let several = synset_folders.len() > 1;
     let mut models = Vec::new();
-    for entry in fs::read_dir(folder).map_err(Error::io(folder))? {
-        let entry = entry.map_err(Error::io(folder))?;
-        let id = entry.file_name().to_string_lossy().into_owned();
-        if let Some((path, layout)) = find_mesh(&entry.path()) {
-            models.push(Model { synset: synset.to_owned(), id, path, layout });
+    for (synset, folder) in synset_folders {
+        for (id, folder) in folders_in(&folder)? {
+            if splits.as_ref().is_some_and(|splits| splits.of(&synset, &id) != split) {
+                continue;
+            }
+            let v1 = folder.join(V1_MESH);
+            let (path, axes) = match v1.is_file() {
+                true => (v1, Axes::SHAPENET_V1),
+                false => (folder.join(V2_MESH), Axes::WORLD),
+            };
+            let id = if several { format!("{synset}/{id}") } else { id };
+            models.push(Model { id, synset: Some(synset.clone()), path, axes });
         }
     }
-    if models.is_empty() {
-        let reason = format!("it holds no ShapeNetCore models of synset {synset}");
-        return Err(Error::Mesh { path: root.into(), reason });
-    }
-    models.sort_by(|a, b| a.id.cmp(&b.id));
     Ok(models)
 }
 
-/// Keeps the models whose id matches a pattern of `include` and none of `exclude`.
-///
-/// In a pattern, `*` stands for any text. An empty `include` keeps all.
-pub fn select_models(mut models: Vec<Model>, include: &[String], exclude: &[String]) -> Vec<Model> {
-    let any = |patterns: &[String], id: &str| patterns.iter().any(|p| matches_pattern(p, id));
-    models.retain(|model| {
-        (include.is_empty() || any(include, &model.id)) && !any(exclude, &model.id)
-    });
-    models
-}
-
-impl Model {
-    /// Reads the mesh into the world frame: up +Y, front −Z, box centred, unit diagonal.
-    pub fn load(&self) -> Result<Loaded> {
-        let mut loaded = read_obj(&self.path)?;
-        if self.layout == Layout::V1 {
-            for vertex in &mut loaded.mesh.vertices {
-                *vertex = v2_from_v1(*vertex);
-            }
+/// The folders of the synsets, by name.
+fn synset_folders(root: &Path, synsets: &[String]) -> Result<Vec<(String, PathBuf)>> {
+    let mut all: Vec<_> =
+        folders_in(root)?.into_iter().filter(|(name, _)| is_synset(name)).collect();
+    if all.is_empty() {
+        // It is a synset itself, whatever it is called; what it is not called, it is not.
+        let name = root.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if !is_synset(&name) {
+            return Ok(vec![(name, root.into())]);
         }
-        loaded.mesh.normalise();
-        Ok(loaded)
+        all.push((name, root.into()));
     }
-}
-
-/// A quarter turn about +Y: the front goes from +X to −Z.
-fn v2_from_v1(point: Point3<f32>) -> Point3<f32> {
-    Point3::new(point.z, point.y, -point.x)
-}
-
-fn find_mesh(model_folder: &Path) -> Option<(PathBuf, Layout)> {
-    let candidates = [("models/model_normalized.obj", Layout::V2), ("model.obj", Layout::V1)];
-    candidates
-        .into_iter()
-        .map(|(name, layout)| (model_folder.join(name), layout))
-        .find(|(path, _)| path.is_file())
-}
-
-/// Whether `text` is `pattern`, where each `*` stands for any text.
-fn matches_pattern(pattern: &str, text: &str) -> bool {
-    let Some((start, rest)) = pattern.split_once('*') else { return pattern == text };
-    let Some(mut remaining) = text.strip_prefix(start) else { return false };
-    let Some((middles, end)) = rest.rsplit_once('*') else { return remaining.ends_with(rest) };
-    // The first place where each piece fits leaves the most for the others.
-    for piece in middles.split('*') {
-        let Some(at) = remaining.find(piece) else { return false };
-        remaining = &remaining[at + piece.len()..];
+    all.sort();
+    if let Some(missing) = synsets.iter().find(|synset| all.iter().all(|(name, _)| name != *synset))
+    {
+        let names: Vec<_> = all.iter().map(|(name, _)| name.as_str()).collect();
+        let reason = format!("it holds no synset {missing}, but {}", names.join(", "));
+        return Err(Error::Collection { path: root.into(), reason });
     }
-    remaining.ends_with(end)
+    all.retain(|(name, _)| synsets.is_empty() || synsets.contains(name));
+    Ok(all)
+}
+
+/// Synsets are named by eight digits.
+fn is_synset(name: &str) -> bool {
+    name.len() == 8 && name.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// The folders within a folder, and links to folders, by name. Hidden ones are left out.
+fn folders_in(folder: &Path) -> Result<Vec<(String, PathBuf)>> {
+    let mut folders = Vec::new();
+    for entry in fs::read_dir(folder).map_err(Error::io(folder))? {
+        let entry = entry.map_err(Error::io(folder))?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if entry.path().is_dir() && !name.starts_with('.') {
+            folders.push((name, entry.path()));
+        }
+    }
+    Ok(folders)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Point3;
 
     /// A wedge whose single highest corner is at `nose`.
     fn write_wedge(path: &Path, nose: &str) {
@@ -119,32 +107,23 @@ mod tests {
         fs::write(path, obj).expect("writable");
     }
 
-    fn fixtures() -> PathBuf {
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/shapenet_v2")
+    fn ids(root: &Path, synsets: &[&str]) -> Vec<String> {
+        let synsets: Vec<_> = synsets.iter().map(|synset| (*synset).to_owned()).collect();
+        let models = find_models(root, &synsets, None).expect("a tree");
+        let mut ids: Vec<_> = models.into_iter().map(|model| model.id).collect();
+        ids.sort();
+        ids
     }
 
     #[test]
-    fn models_of_both_layouts_are_found_in_order() {
-        let root = tempfile::tempdir().expect("a temporary folder");
-        write_wedge(&root.path().join("02958343/b/model.obj"), "2 1 0");
-        write_wedge(&root.path().join("02958343/a/models/model_normalized.obj"), "0 1 -2");
-        fs::create_dir_all(root.path().join("02958343/empty")).expect("writable");
-        fs::write(root.path().join("02958343/all.csv"), "id").expect("writable");
-
-        let models = find_models(root.path(), CARS).expect("two models");
-        let found: Vec<_> = models.iter().map(|m| (m.id.as_str(), m.layout)).collect();
-        assert_eq!(found, [("a", Layout::V2), ("b", Layout::V1)]);
-        assert_eq!(find_models(&root.path().join(CARS), CARS).expect("the same"), models);
-    }
-
-    #[test]
-    fn fronts_of_both_layouts_point_to_minus_z() {
+    fn fronts_of_both_versions_point_to_minus_z() {
         let root = tempfile::tempdir().expect("a temporary folder");
         write_wedge(&root.path().join("02958343/v1/model.obj"), "2 1 0");
         write_wedge(&root.path().join("02958343/v2/models/model_normalized.obj"), "0 1 -2");
-        for model in find_models(root.path(), CARS).expect("two models") {
-            let mesh = model.load().expect("a wedge").mesh;
-            let nose = mesh.vertices[0];
+        let models = find_models(root.path(), &[], None).expect("two models");
+        assert_eq!(models.len(), 2);
+        for model in models {
+            let nose = model.load().expect("a wedge").mesh.vertices[0];
             let diagonal = 33.0_f32.sqrt(); // of 4 × 1 × 4
             let expected = Point3::new(0.0, 0.5, -2.0) / diagonal;
             assert!((nose - expected).norm() < 1e-6, "{}: {nose}", model.id);
@@ -153,59 +132,42 @@ mod tests {
 
     #[test]
     fn a_real_car_loads_into_the_world_frame() {
-        let models = find_models(&fixtures(), CARS).expect("the fixture");
-        let Loaded { mesh, warnings } = models[0].load().expect("a car");
-        assert!(warnings.is_empty(), "{warnings:?}");
-        let bounds = mesh.bounds().expect("it has triangles");
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/shapenet_v2");
+        assert!(is_tree(&root).expect("it is there"));
+        let models = find_models(&root, &[CARS.into()], None).expect("the fixture");
+        let loaded = models[0].load().expect("a car");
+        assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+        let bounds = loaded.mesh.bounds().expect("it has triangles");
         assert!(bounds.center().coords.norm() < 1e-6);
         assert!((bounds.diagonal() - 1.0).abs() < 1e-6);
     }
 
     #[test]
-    fn a_folder_without_models_is_refused() {
+    fn one_synset_several_or_all_are_found_from_the_tree_and_from_the_synset() {
         let root = tempfile::tempdir().expect("a temporary folder");
-        let error = find_models(root.path(), CARS).expect_err("it is empty").to_string();
-        assert!(error.contains(CARS), "{error}");
-        assert!(find_models(&root.path().join("none"), CARS).is_err());
-    }
-
-    #[test]
-    fn a_star_stands_for_any_text() {
-        for (pattern, text) in [
-            ("car", "car"),
-            ("*", ""),
-            ("c*", "car"),
-            ("*r", "car"),
-            ("c*r", "car"),
-            ("*a*", "car"),
-            ("a*b*c", "a1b2b3c"),
-            ("a**b", "ab"),
-        ] {
-            assert!(matches_pattern(pattern, text), "{pattern} {text}");
+        for name in ["02958343/a", "02958343/b", "03001627/a", "02691156/c"] {
+            write_wedge(&root.path().join(name).join(V2_MESH), "0 1 -2");
         }
-        for (pattern, text) in [
-            ("car", "cart"),
-            ("", "a"),
-            ("c*", "acr"),
-            ("ab*ba", "aba"),
-            ("a*b*b", "ab"),
-            ("*x*", "car"),
-        ] {
-            assert!(!matches_pattern(pattern, text), "{pattern} {text}");
+        fs::write(root.path().join("taxonomy.json"), "{}").expect("writable");
+        let synset = root.path().join(CARS);
+        assert_eq!(ids(root.path(), &[CARS]), ["a", "b"]);
+        assert_eq!(ids(&synset, &[CARS]), ["a", "b"]);
+        assert_eq!(ids(&synset, &[]), ["a", "b"]);
+        let two = ["02958343/a", "02958343/b", "03001627/a"];
+        assert_eq!(ids(root.path(), &["03001627", CARS]), two);
+        assert_eq!(ids(root.path(), &[]).len(), 4);
+        for root in [root.path(), &synset] {
+            let error = find_models(root, &["04256520".into()], None).unwrap_err().to_string();
+            assert!(error.contains("04256520") && error.contains(CARS), "{error}");
         }
     }
 
     #[test]
-    fn excluding_wins_over_including() {
-        let model = |id: &str| Model {
-            synset: CARS.into(),
-            id: id.into(),
-            path: PathBuf::new(),
-            layout: Layout::V2,
-        };
-        let models = vec![model("suv_1"), model("suv_2"), model("van_1")];
-        let kept = select_models(models.clone(), &["suv*".into()], &["*_2".into()]);
-        assert_eq!(kept, [model("suv_1")]);
-        assert_eq!(select_models(models.clone(), &[], &[]), models);
+    fn a_model_without_a_mesh_is_found_and_cannot_be_loaded() {
+        let root = tempfile::tempdir().expect("a temporary folder");
+        fs::create_dir_all(root.path().join("02958343/empty")).expect("writable");
+        let models = find_models(root.path(), &[], None).expect("one model");
+        let error = models[0].load().expect_err("it has no mesh").to_string();
+        assert!(error.contains("empty"), "{error}");
     }
 }

@@ -1,16 +1,11 @@
 //! What a training run is: presets state what differs from these defaults.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::{fs, path::Path};
 
 use serde::{Deserialize, Serialize};
 
-use crate::{
-    Error, Result, data::viewpoint::ViewpointRange, regressor::RegressorConfig,
-    shape_prior::ShapePriorConfig,
-};
+use super::DataConfig;
+use crate::{Error, Result, regressor::RegressorConfig, shape_prior::ShapePriorConfig};
 
 /// A whole run: two runs of one config give the same weights.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -20,49 +15,6 @@ pub struct TrainingConfig {
     pub data: DataConfig,
     pub prior: PriorStageConfig,
     pub regressors: RegressorStageConfig,
-}
-
-/// The shapes, and the pictures of them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct DataConfig {
-    /// Shapes to train on.
-    pub n_models: usize,
-    /// Shapes held out, to measure on.
-    pub n_validation: usize,
-    /// Points sampled from each surface, once.
-    pub points_per_model: usize,
-    /// Pictures of each training shape, and how many paints they are spread over.
-    pub views_per_model: usize,
-    pub paints_per_model: usize,
-    /// Pictures of each held-out shape.
-    pub views_per_validation: usize,
-    pub viewpoints: ViewpointRange,
-    /// A copy of ShapeNet (version 1 or 2); without it, shapes are procedural cars.
-    pub shapenet: Option<PathBuf>,
-    /// The category there; 02958343 are cars.
-    pub synset: String,
-    /// Which model ids to take (all, if empty) and which of these to leave; `*` is anything.
-    pub include: Vec<String>,
-    pub exclude: Vec<String>,
-}
-
-impl Default for DataConfig {
-    fn default() -> Self {
-        Self {
-            n_models: 1500,
-            n_validation: 60,
-            points_per_model: 24_576,
-            views_per_model: 24,
-            paints_per_model: 3,
-            views_per_validation: 8,
-            viewpoints: ViewpointRange::default(),
-            shapenet: None,
-            synset: "02958343".into(),
-            include: Vec::new(),
-            exclude: Vec::new(),
-        }
-    }
 }
 
 /// The autoencoder and its training.
@@ -173,6 +125,7 @@ impl TrainingConfig {
         self.prior.network.check()?;
         self.regressors.network.check()?;
         let data = &self.data;
+        data.selection()?;
         let positive = [
             ("n_models", data.n_models),
             ("n_validation", data.n_validation),

@@ -5,6 +5,7 @@
 
 mod batches;
 mod config;
+mod data_config;
 mod crops;
 mod metrics;
 mod pose_errors;
@@ -15,7 +16,8 @@ mod shape_stage;
 mod shapes;
 mod stage;
 
-pub use config::{DataConfig, PriorStageConfig, RegressorStageConfig, Schedule, TrainingConfig};
+pub use config::{PriorStageConfig, RegressorStageConfig, Schedule, TrainingConfig};
+pub use data_config::DataConfig;
 
 use std::{fs, path::Path, sync::Mutex};
 
@@ -68,8 +70,8 @@ fn begin(config: &TrainingConfig, out: &Path) -> Result<()> {
     let holds = |file: &str| out.join(file).exists();
     if holds(CONFIG_FILE) {
         let other = TrainingConfig::read(&path)?;
-        let same_shapes =
-            (config.seed, &config.data, &config.prior) == (other.seed, &other.data, &other.prior);
+        let same_shapes = (config.seed, config.data.without_cache(), &config.prior)
+            == (other.seed, other.data.without_cache(), &other.prior);
         let same_regressors = config.regressors == other.regressors;
         let shape_begun = holds(SHAPE_FILE) || holds("prior.checkpoint");
         let regressors_begun = holds(REGRESSORS_FILE) || holds("regressors.checkpoint");

@@ -1,4 +1,6 @@
-//! The shapes to train on and those held out: procedural cars, or a category of ShapeNet.
+//! The shapes to train on and those held out: procedural cars, or a collection of meshes.
+
+use std::path::Path;
 
 use nalgebra::Point3;
 use rand::{Rng, seq::SliceRandom};
@@ -8,11 +10,12 @@ use super::DataConfig;
 use crate::{
     Error, Result,
     data::{
+        collection::{Collection, Model},
         keyed_rng,
         mesh::Mesh,
         procedural::CarParameters,
-        shapenet::{Model, find_models, select_models},
         surface::sample_surface,
+        surface_cache::SurfaceSampler,
     },
 };
 
@@ -32,28 +35,41 @@ pub(super) struct Shapes {
 
 enum Source {
     ProceduralCars,
-    ShapeNet(Vec<Model>),
+    /// Each with `n_points` on its surface, and more where more are asked for.
+    Meshes {
+        models: Vec<Model>,
+        sampler: SurfaceSampler,
+        n_points: usize,
+    },
 }
 
 impl Shapes {
-    /// Looks for models, without reading them yet.
+    /// Looks for as many models as are wanted. Each is read once: one that cannot be is listed, and
+    /// another takes its place.
     pub fn open(config: &DataConfig, seed: u64) -> Result<Self> {
-        let Some(root) = &config.shapenet else {
+        let Some(root) = &config.meshes else {
             let (n_training, n_validation) = (config.n_models, config.n_validation);
             return Ok(Self { source: Source::ProceduralCars, seed, n_training, n_validation });
         };
-        let models = find_models(root, &config.synset)?;
-        let mut models = select_models(models, &config.include, &config.exclude);
-        if models.len() <= config.n_validation {
-            let (found, held_out) = (models.len(), config.n_validation);
-            let reason = format!("{found} models match, of which {held_out} are to be held out");
-            return Err(Error::Config { path: root.clone(), reason });
-        }
+        let invalid = |reason| Error::Config { path: root.clone(), reason };
+        let mut models = Collection::open(root, &config.selection().map_err(invalid)?)?.models;
         // The order of ids says something about who made a model.
         models.shuffle(&mut keyed_rng(seed, [ORDER, 0]));
-        let n_training = config.n_models.min(models.len() - config.n_validation);
-        let n_validation = config.n_validation;
-        Ok(Self { source: Source::ShapeNet(models), seed, n_training, n_validation })
+        let sampler = SurfaceSampler::new(seed, config.cache.clone())?;
+        let (n_points, n_validation) = (config.points_per_model, config.n_validation);
+        let n_wanted = config.n_models.saturating_add(n_validation);
+        eprintln!("meshes: reading {} of {}", n_wanted.min(models.len()), models.len());
+        let check = |model: &Model| sampler.sample(model, n_points).map(|_| ());
+        let models = take_usable(root, models, n_wanted, check)?;
+        if models.len() <= n_validation {
+            let n_usable = models.len();
+            return Err(invalid(format!(
+                "{n_usable} models are usable, of which {n_validation} are to be held out"
+            )));
+        }
+        let n_training = models.len() - n_validation;
+        let source = Source::Meshes { models, sampler, n_points };
+        Ok(Self { source, seed, n_training, n_validation })
     }
 
     /// Numbers of the shapes to train on.
@@ -74,18 +90,60 @@ impl Shapes {
                     CarParameters::random(&mut keyed_rng(self.seed, [SHAPE, model_idx as u64]));
                 Ok(car.mesh(&mut keyed_rng(self.seed, [PAINT + paint as u64, model_idx as u64])))
             }
-            Source::ShapeNet(models) => Ok(models[model_idx].load()?.mesh),
+            Source::Meshes { models, .. } => Ok(models[model_idx].load()?.mesh),
         }
     }
 
-    /// Each shape's own surface points. Shapes that cannot be read are an error: exclude them.
+    /// Each shape's own surface points.
     pub fn surfaces(&self, models: &[usize], n_points: usize) -> Result<Vec<Surface>> {
-        let sample = |&model_idx: &usize| {
-            let mut rng = keyed_rng(self.seed, [SURFACE, model_idx as u64]);
-            let points = sample_surface(&self.mesh(model_idx, 0)?, n_points, &mut rng);
-            Ok(Surface(points.into_iter().map(|point: Point3<f32>| point.coords.into()).collect()))
+        let sample = |&model_idx: &usize| -> Result<Surface> {
+            let points: Vec<Point3<f32>> = match &self.source {
+                Source::ProceduralCars => {
+                    let mut rng = keyed_rng(self.seed, [SURFACE, model_idx as u64]);
+                    sample_surface(&self.mesh(model_idx, 0)?, n_points, &mut rng)
+                }
+                // Up to `points_per_model`, fewer points are the first of those that are kept.
+                Source::Meshes { models, sampler, n_points: n_kept } => {
+                    sampler.sample(&models[model_idx], n_points.max(*n_kept))?
+                }
+            };
+            Ok(Surface(points.iter().take(n_points).map(|point| point.coords.into()).collect()))
         };
         models.par_iter().map(sample).collect()
+    }
+}
+
+/// The first `n_wanted` models that pass a check. Those that do not are listed on stderr.
+fn take_usable(
+    root: &Path,
+    models: Vec<Model>,
+    n_wanted: usize,
+    check: impl Fn(&Model) -> Result<()> + Sync,
+) -> Result<Vec<Model>> {
+    let mut usable = Vec::new();
+    let mut first_error = None;
+    let mut models = models.into_iter();
+    while usable.len() < n_wanted && models.len() > 0 {
+        let batch: Vec<_> = models.by_ref().take(n_wanted - usable.len()).collect();
+        let results: Vec<_> =
+            batch.into_par_iter().map(|model| check(&model).map(|()| model)).collect();
+        for result in results {
+            match result {
+                Ok(model) => usable.push(model),
+                Err(error @ Error::Cache { .. }) => return Err(error),
+                Err(error) => {
+                    eprintln!("skipped: {error}");
+                    first_error.get_or_insert(error);
+                }
+            }
+        }
+    }
+    match first_error {
+        Some(error) if usable.is_empty() => {
+            let reason = format!("none of its models is usable; the first: {error}");
+            Err(Error::Collection { path: root.into(), reason })
+        }
+        _ => Ok(usable),
     }
 }
 

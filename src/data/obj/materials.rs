@@ -3,17 +3,16 @@
 use std::{
     collections::HashMap,
     fs,
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
 };
 
-use image::{ImageReader, ImageResult, RgbImage};
+use image::RgbImage;
 
 use super::numbers;
-
-/// What has no material, or one without a colour.
-const GREY: [f32; 3] = [0.7; 3];
-/// Largest side of a texture that is decoded, in pixels.
-const LARGEST_TEXTURE: u32 = 16_384;
+use crate::data::{
+    mesh::GREY,
+    mesh_file::{decode_texture, resolve_inside},
+};
 
 /// A diffuse colour, times a texture if there is one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,8 +58,19 @@ impl Library {
         }
     }
 
-    /// Adds the materials of an MTL file, named relative to the OBJ file.
-    pub fn read(&mut self, name: &str) {
+    /// Adds the materials of an MTL file, named relative to the OBJ file, or of several.
+    pub fn read(&mut self, names: &str) {
+        // Spaces stand between names, and in names.
+        let one = resolve_inside(&self.obj_folder, names)
+            .is_some_and(|path| self.model_folder.join(path).is_file());
+        if one || !names.contains(char::is_whitespace) {
+            self.read_file(names);
+        } else {
+            names.split_whitespace().for_each(|name| self.read_file(name));
+        }
+    }
+
+    fn read_file(&mut self, name: &str) {
         let Some(path) = resolve_inside(&self.obj_folder, name) else {
             return self.warn(format!("materials {name:?} lie outside of the model's folder"));
         };
@@ -122,13 +132,14 @@ impl Library {
         if let Some(&texture) = self.decoded.get(&path) {
             return texture;
         }
-        let texture = match decode(&self.model_folder.join(&path)) {
+        let bytes = fs::read(self.model_folder.join(&path)).map_err(|error| error.to_string());
+        let texture = match bytes.and_then(|bytes| decode_texture(&bytes)) {
             Ok(image) => {
                 self.textures.push(image);
                 Some(self.textures.len() as u32 - 1)
             }
-            Err(error) => {
-                self.warn(format!("texture {name:?}: {error}"));
+            Err(reason) => {
+                self.warn(format!("texture {name:?}: {reason}"));
                 None
             }
         };
@@ -139,29 +150,4 @@ impl Library {
     fn warn(&mut self, warning: String) {
         self.warnings.push(warning);
     }
-}
-
-/// Follows a relative path from `folder`, which is itself relative to the model's folder, without
-/// leaving the latter.
-fn resolve_inside(folder: &Path, name: &str) -> Option<PathBuf> {
-    let name = name.replace('\\', "/"); // Exporters on Windows write these.
-    let mut resolved = folder.to_owned();
-    for component in Path::new(&name).components() {
-        match component {
-            Component::Normal(part) => resolved.push(part),
-            Component::ParentDir => resolved.pop().then_some(())?,
-            Component::CurDir => {}
-            Component::RootDir | Component::Prefix(_) => return None,
-        }
-    }
-    Some(resolved)
-}
-
-fn decode(path: &Path) -> ImageResult<RgbImage> {
-    let mut reader = ImageReader::open(path)?.with_guessed_format()?;
-    let mut limits = image::Limits::default();
-    limits.max_image_width = Some(LARGEST_TEXTURE);
-    limits.max_image_height = Some(LARGEST_TEXTURE);
-    reader.limits(limits);
-    Ok(reader.decode()?.to_rgb8())
 }

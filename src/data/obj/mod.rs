@@ -1,24 +1,15 @@
 //! Wavefront OBJ files, as far as shape and diffuse colour go.
-//!
-//! Shape is strict: a file that does not parse is refused with its line. Appearance is lenient: a
-//! missing material or texture leaves a plain colour and a warning.
 
 mod materials;
 
 use std::{fs, path::Path};
 
-use nalgebra::Point3;
-
 use self::materials::{Library, Material};
-use super::mesh::{Mesh, Triangle};
+use super::{
+    mesh::{Mesh, Triangle, checked_vertex, fan},
+    mesh_file::{Loaded, usable_uv},
+};
 use crate::{Error, Result};
-
-/// A mesh, and what its file promised but did not deliver.
-#[derive(Clone, Debug)]
-pub struct Loaded {
-    pub mesh: Mesh,
-    pub warnings: Vec<String>,
-}
 
 /// Reads a mesh in the frame of its file. Polygons become fans of triangles; lines and points are
 /// left out.
@@ -30,8 +21,9 @@ pub fn read_obj(path: &Path) -> Result<Loaded> {
     let refuse = |reason| Error::Mesh { path: path.into(), reason };
 
     let mut reader = Reader::new(path);
-    // Only names and comments can be anything but ASCII.
-    for (idx, line) in String::from_utf8_lossy(&bytes).lines().enumerate() {
+    // Only names, comments and a byte order mark can be anything but ASCII.
+    let text = String::from_utf8_lossy(&bytes);
+    for (idx, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         reader.read_line(line).map_err(|reason| refuse(format!("line {}: {reason}", idx + 1)))?;
     }
     let Reader { mut mesh, library, .. } = reader;
@@ -73,14 +65,10 @@ impl Reader {
         let line = line.trim();
         let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         match keyword {
-            "v" => self.mesh.vertices.push(Point3::from(numbers(rest)?)),
-            // Unusable coordinates spoil the look of a triangle, not its shape.
-            "vt" => self.texture_coordinates.push(
-                numbers(rest)
-                    .ok()
-                    .filter(|uv: &[f32; 2]| uv.iter().all(|x| x.abs() < 1e4))
-                    .unwrap_or_default(),
-            ),
+            "v" => self.mesh.vertices.push(checked_vertex(numbers(rest)?)?),
+            "vt" => {
+                self.texture_coordinates.push(numbers(rest).map(usable_uv).unwrap_or_default());
+            }
             "f" => self.read_face(rest)?,
             "mtllib" => self.library.read(rest.trim()),
             "usemtl" => self.material = self.library.material(rest.trim()),
@@ -96,12 +84,11 @@ impl Reader {
             return Err(format!("a face needs three corners, not {}", corners.len()));
         }
         let Material { color, texture } = self.material;
-        for pair in corners[1..].windows(2) {
-            let fan = [corners[0], pair[0], pair[1]];
-            let textured = fan.iter().all(|corner| corner.uv.is_some());
+        for corners in fan(&corners) {
+            let textured = corners.iter().all(|corner| corner.uv.is_some());
             self.mesh.triangles.push(Triangle {
-                vertices: fan.map(|corner| corner.vertex),
-                uvs: fan.map(|corner| corner.uv.unwrap_or_default()),
+                vertices: corners.map(|corner| corner.vertex),
+                uvs: corners.map(|corner| corner.uv.unwrap_or_default()),
                 color,
                 texture: texture.filter(|_| textured),
             });

@@ -125,6 +125,35 @@ fn nothing_outside_of_the_model_folder_is_read() {
 }
 
 #[test]
+fn several_material_files_are_read_and_names_may_hold_spaces() {
+    let files: [(&str, &[u8]); 3] = [
+        ("models/a.mtl", b"newmtl red\nKd 1 0 0\n"),
+        ("models/b.mtl", b"newmtl blue\nKd 0 0 1\n"),
+        ("models/my car.mtl", b"newmtl green\nKd 0 1 0\n"),
+    ];
+    let obj = format!(
+        "mtllib a.mtl b.mtl\nmtllib my car.mtl\n{QUAD}usemtl red\nf 1 2 3\nusemtl blue\nf 1 2 3\nusemtl green\nf 1 2 3\n"
+    );
+    let Loaded { mesh, warnings } = loaded(&obj, &files);
+    let colors: Vec<_> = mesh.triangles.iter().map(|triangle| triangle.color).collect();
+    assert_eq!(colors, [[1., 0., 0.], [0., 0., 1.], [0., 1., 0.]]);
+    assert!(warnings.is_empty(), "{warnings:?}");
+}
+
+#[test]
+fn a_byte_order_mark_hides_no_vertex() {
+    let obj = format!("\u{feff}{QUAD}f 1 2 3\n");
+    assert_eq!(loaded(&obj, &[]).mesh.vertices.len(), 4);
+}
+
+#[test]
+fn interiors_repeated_and_zero_area_faces_load() {
+    // Three faces on the edge 1 2, one of them twice, and one that is a line.
+    let obj = format!("{QUAD}v 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 2 5\nf 5 2 1\nf 1 2 2\n");
+    assert_eq!(loaded(&obj, &[]).mesh.triangles.len(), 5);
+}
+
+#[test]
 fn unusable_texture_coordinates_do_not_cost_the_mesh() {
     let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt nan nan\nvt\nvt 1 1 0\nf 1/1 2/2 3/3\n";
     assert_eq!(loaded(obj, &[]).mesh.triangles[0].uvs, [[0., 0.], [0., 0.], [1., 1.]]);
@@ -144,7 +173,9 @@ fn broken_geometry_is_refused_with_its_line() {
     check_refused(&format!("{QUAD}f 1 2 {}\n", i64::MIN), "line 9");
     check_refused(&format!("{QUAD}f a b c\n"), "line 9: \"a\"");
     check_refused(&format!("{QUAD}f 1 1 1\n"), "no area");
-    check_refused("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "vertex 1");
+    check_refused("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "line 1: coordinate NaN");
+    check_refused("v 0 0 0\nv 1e400 0 0\nv 0 1 0\nf 1 2 3\n", "line 2: coordinate inf");
+    check_refused("v 0 0 0\nv 1 0 0\nv 0 1e9 0\nf 1 2 3\n", "line 3: coordinate 1000000000");
     check_refused("\u{0}\u{1}\u{2}binary", "no triangles");
 }
 

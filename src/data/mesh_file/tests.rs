@@ -1,0 +1,115 @@
+use super::*;
+use crate::data::{keyed_rng, mesh::Triangle};
+use rand::Rng;
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
+}
+
+fn read(name: &str) -> Loaded {
+    read_mesh(&fixture(name)).expect("the fixture is a mesh")
+}
+
+/// Every triangle of the car has a triangle of the file with the same corners, and the colour that
+/// `color` makes of its own.
+#[track_caller]
+fn check_is_the_car(name: &str, color: fn(f32) -> f32) {
+    let car = read("shapenet_v2/02958343/smarts_simple_car/models/model_normalized.obj").mesh;
+    let Loaded { mesh, warnings } = read(name);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!(mesh.triangles.len(), car.triangles.len());
+
+    let near = |a: f32, b: f32, tolerance: f32| (a - b).abs() < tolerance;
+    for triangle in &car.triangles {
+        let expected = car.corners(triangle);
+        let is_same = |other: &&Triangle| {
+            let corners = mesh.corners(other);
+            let placed = (0..3)
+                .any(|turn| (0..3).all(|i| (corners[(i + turn) % 3] - expected[i]).amax() < 2e-6));
+            // Colours were written as bytes.
+            placed && (0..3).all(|c| near(other.color[c], color(triangle.color[c]), 0.01))
+        };
+        assert!(mesh.triangles.iter().any(|other| is_same(&other)), "{expected:?}");
+    }
+}
+
+#[test]
+fn a_car_is_the_same_in_every_format() {
+    check_is_the_car("formats/car.ply", |channel| channel);
+    // This one has no colours.
+    check_is_the_car("formats/car.off", |_| 0.7);
+    // This one was written as light.
+    check_is_the_car("formats/car.glb", |channel| match channel <= 0.003_130_8 {
+        true => 12.92 * channel,
+        false => 1.055 * channel.powf(1.0 / 2.4) - 0.055,
+    });
+}
+
+#[test]
+fn a_texture_lies_the_same_in_every_format() {
+    let square = read("formats/square.obj").mesh;
+    for name in ["formats/square.glb", "formats/square.gltf"] {
+        let Loaded { mesh, warnings } = read(name);
+        assert!(warnings.is_empty(), "{warnings:?}");
+        assert_eq!(mesh.textures, square.textures);
+        for (triangle, expected) in mesh.triangles.iter().zip(&square.triangles) {
+            assert_eq!(mesh.corners(triangle), square.corners(expected));
+            assert_eq!(triangle.uvs, expected.uvs);
+            assert_eq!(triangle.texture, Some(0));
+            assert!(triangle.color.iter().all(|channel| (channel - 1.0).abs() < 1e-6));
+        }
+    }
+}
+
+#[test]
+fn damaged_files_are_read_or_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for entry in fs::read_dir(fixture("formats")).expect("the fixtures") {
+        let path = entry.expect("a fixture").path();
+        fs::copy(&path, folder.path().join(path.file_name().expect("a name"))).expect("writable");
+    }
+    for name in ["square.obj", "square.gltf", "square.glb", "car.glb", "car.ply", "car.off"] {
+        let path = folder.path().join(name);
+        let whole = fs::read(&path).expect("readable");
+        for damage in 0..100 {
+            let mut rng = keyed_rng(damage, [0, 0]);
+            let mut bytes = whole.clone();
+            // Headers hold what everything else depends on.
+            let reach = if rng.random() { bytes.len() } else { bytes.len().min(1000) };
+            for _ in 0..rng.random_range(1..4) {
+                bytes[rng.random_range(0..reach)] = rng.random();
+            }
+            fs::write(&path, &bytes).expect("writable");
+            // What is read was found usable; all that could go wrong is a panic.
+            let _ = read_mesh(&path);
+        }
+    }
+}
+
+#[test]
+fn an_unknown_extension_is_refused() {
+    for name in ["car.fbx", "car", "car.OBJ.bak"] {
+        let error = read_mesh(Path::new(name)).unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains("obj, glb, gltf"), "{error}");
+        assert!(!is_mesh_file(Path::new(name)));
+    }
+    assert!(is_mesh_file(Path::new("CAR.GLB")));
+}
+
+#[test]
+fn the_hash_follows_the_shape_wherever_it_lies() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let files = ["square.gltf", "square_indices.bin", "square_positions.bin", "square.png"];
+    for name in files.into_iter().chain(["texture coordinates.bin"]) {
+        let bytes = fs::read(fixture("formats").join(name)).expect("the fixture");
+        fs::write(folder.path().join(name), bytes).expect("writable");
+    }
+    let hash = |name: &str| shape_hash(&folder.path().join(name)).expect("readable");
+    let before = hash("square.gltf");
+    fs::remove_file(folder.path().join("square.png")).expect("it is there");
+    assert_eq!(hash("square.gltf"), before);
+    let mut positions = fs::read(folder.path().join("square_positions.bin")).expect("readable");
+    positions[3] ^= 1;
+    fs::write(folder.path().join("square_positions.bin"), positions).expect("writable");
+    assert_ne!(hash("square.gltf"), before);
+}
