@@ -3,6 +3,7 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Args, Parser, Subcommand};
+use coverage::CoverageArguments;
 use object_pba::{
     Result,
     device::Backend,
@@ -10,6 +11,7 @@ use object_pba::{
 };
 use render::RenderArguments;
 
+mod coverage;
 mod render;
 
 /// Large tensors come and go with every operation; the system's allocator returns each one's pages
@@ -35,6 +37,8 @@ enum Command {
     All(Arguments),
     /// Render sequences with their ground truth.
     Render(RenderArguments),
+    /// Measure how far real cars are from the procedural family.
+    Coverage(CoverageArguments),
 }
 
 /// Interrupt training whenever you like: the same command goes on from its last checkpoint.
@@ -71,6 +75,7 @@ fn main() -> ExitCode {
         Command::Regressors(arguments) => train(&arguments, false, true),
         Command::All(arguments) => train(&arguments, true, true),
         Command::Render(arguments) => render::render(&arguments),
+        Command::Coverage(arguments) => coverage::coverage(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
