@@ -6,6 +6,7 @@ use std::{fs, path::PathBuf};
 
 use clap::Args;
 use indicatif::{ParallelProgressIterator, ProgressStyle};
+use nalgebra::Point3;
 use object_pba::{
     Error, Result,
     data::{
@@ -16,6 +17,7 @@ use object_pba::{
         surface::sample_surface,
     },
     metrics::style_error,
+    nearest_neighbours::nearest_neighbours,
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -60,6 +62,7 @@ struct Coverage {
     points: u32,
     seed: u64,
     mean_chamfer: f64,
+    mean_from_mesh: f64,
     mean_noise_floor: f64,
     meshes: Vec<Nearest>,
 }
@@ -71,6 +74,9 @@ struct Nearest {
     car_seed: u64,
     /// Eq. 7 between the two.
     chamfer: f64,
+    /// Its half from the mesh to the car: what the car lacks. The other half is what the mesh lacks,
+    /// often a floor.
+    from_mesh: f64,
     /// Eq. 7 between two samplings of the mesh itself.
     noise_floor: f64,
 }
@@ -121,7 +127,7 @@ fn measure(arguments: &CoverageArguments, real_cars: &[RealCar]) -> Coverage {
         .par_iter()
         .progress_with_style(style.expect("a valid template"))
         .map(|&seed| {
-            let points = cloud(&procedural::car(seed), arguments, [PROCEDURAL, seed]);
+            let points = car_cloud(arguments, seed);
             (seed, real_cars.iter().map(|real| style_error(&points, &real.points)).collect())
         })
         .collect();
@@ -130,7 +136,13 @@ fn measure(arguments: &CoverageArguments, real_cars: &[RealCar]) -> Coverage {
         let of_mesh = distances.iter().map(|(seed, distances)| (*seed, distances[idx]));
         let (car_seed, chamfer) =
             of_mesh.min_by(|a, b| a.1.total_cmp(&b.1)).expect("at least one car");
-        Nearest { id: real.id.clone(), car_seed, chamfer, noise_floor: real.noise_floor }
+        Nearest {
+            id: real.id.clone(),
+            car_seed,
+            chamfer,
+            from_mesh: mean_squared_distance(&real.points, &car_cloud(arguments, car_seed)),
+            noise_floor: real.noise_floor,
+        }
     };
     let meshes: Vec<Nearest> = real_cars.iter().enumerate().map(nearest).collect();
     let mean =
@@ -140,6 +152,7 @@ fn measure(arguments: &CoverageArguments, real_cars: &[RealCar]) -> Coverage {
         points: arguments.points,
         seed: arguments.seed,
         mean_chamfer: mean(|nearest| nearest.chamfer),
+        mean_from_mesh: mean(|nearest| nearest.from_mesh),
         mean_noise_floor: mean(|nearest| nearest.noise_floor),
         meshes,
     }
@@ -148,16 +161,34 @@ fn measure(arguments: &CoverageArguments, real_cars: &[RealCar]) -> Coverage {
 fn print_table(coverage: &Coverage) {
     let Coverage { models, points, .. } = coverage;
     println!("Chamfer to the nearest of {models} procedural cars, 1e-3 at {points} points");
-    println!("{:32} {:>8} {:>8}  {:>8}", "mesh", "nearest", "floor", "car");
-    for Nearest { id, car_seed, chamfer, noise_floor } in &coverage.meshes {
-        println!("{id:32} {:8.3} {:8.3}  {car_seed:8}", chamfer * 1e3, noise_floor * 1e3);
+    println!("{:28} {:>9} {:>9} {:>9} {:>9}", "mesh", "nearest", "from mesh", "floor", "car");
+    let row = |id: &str, distances: [f64; 3], car: &str| {
+        let [nearest, from_mesh, floor] = distances.map(|distance| distance * 1e3);
+        println!("{id:28} {nearest:9.3} {from_mesh:9.3} {floor:9.3} {car:>9}");
+    };
+    for Nearest { id, car_seed, chamfer, from_mesh, noise_floor } in &coverage.meshes {
+        row(id, [*chamfer, *from_mesh, *noise_floor], &car_seed.to_string());
     }
-    let [chamfer, floor] = [coverage.mean_chamfer, coverage.mean_noise_floor].map(|c| c * 1e3);
-    println!("{:32} {chamfer:8.3} {floor:8.3}", "mean");
+    let Coverage { mean_chamfer, mean_from_mesh, mean_noise_floor, .. } = *coverage;
+    row("mean", [mean_chamfer, mean_from_mesh, mean_noise_floor], "");
+}
+
+/// The half of Eq. 7 that goes one way.
+fn mean_squared_distance(from: &[[f32; 3]], to: &[[f32; 3]]) -> f64 {
+    let squared = from.iter().zip(nearest_neighbours(from, to)).map(|(&from, nearest)| {
+        let offset = Point3::from(from) - Point3::from(to[nearest as usize]);
+        f64::from(offset.norm_squared())
+    });
+    squared.sum::<f64>() / from.len() as f64
 }
 
 fn seeds(arguments: &CoverageArguments) -> std::ops::Range<u64> {
     arguments.seed..arguments.seed + arguments.models
+}
+
+/// The same points whenever it is asked for.
+fn car_cloud(arguments: &CoverageArguments, seed: u64) -> Vec<[f32; 3]> {
+    cloud(&procedural::car(seed), arguments, [PROCEDURAL, seed])
 }
 
 fn cloud(mesh: &Mesh, arguments: &CoverageArguments, key: [u64; 2]) -> Vec<[f32; 3]> {

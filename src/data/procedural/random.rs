@@ -16,6 +16,8 @@ struct Character {
     /// Length and height as multiples of the typical ones: small cars are short and tall.
     stretch: f32,
     tallness: f32,
+    /// Rise of bonnet, belt and deck, as a fraction of the height.
+    waist: f32,
     /// From angular, about 0.1, to round, about 1.
     roundness: f32,
 }
@@ -30,9 +32,12 @@ impl Character {
             (false, false) => [0.9..1.1, 0.9..1.12],
         }
         .map(|range| rng.random_range(range));
-        let angular = rng.random_bool(0.3) || style == BodyStyle::BoxTruck;
+        let angular =
+            rng.random_bool(if short { 0.5 } else { 0.3 }) || style == BodyStyle::BoxTruck;
         let roundness = if angular { 0.08..0.4 } else { 0.4..1.15 };
-        Self { stretch, tallness, roundness: rng.random_range(roundness) }
+        let roundness = rng.random_range(roundness);
+        let waist = if short { rng.random_range(-0.11..0.04) } else { around(-0.01, 0.05, rng) };
+        Self { stretch, tallness, waist, roundness }
     }
 }
 
@@ -72,7 +77,7 @@ impl CarParameters {
             fittings: Fittings::random(style, rng),
         };
         let lift = rng.random_range(0.08..0.4);
-        if style.is_rugged() && rng.random_bool(0.25) { car.lifted(lift) } else { car }
+        if style.is_rugged() && rng.random_bool(0.35) { car.lifted(lift) } else { car }
     }
 
     /// The same body, higher above the wheels by `rise` metres.
@@ -125,8 +130,9 @@ impl Cabin {
         let roomy = !style.has_deck();
         let boxed = style == BodyStyle::BoxTruck;
         let widest_shelf = if character.roundness < 0.4 { 0.13 } else { 0.05 };
+        let cowl_spread = if style == BodyStyle::Van { 0.08 } else { 0.04 };
         Self {
-            cowl: around(cowl, 0.04, rng).max(0.06),
+            cowl: around(cowl, cowl_spread, rng).max(0.06),
             windscreen_rake: (steeper(windscreen_rake) + around(0.0, 8.0, rng)).min(84.0),
             roof_end: around(roof_end, 0.05, rng).min(0.97),
             rear_rake: (steeper(rear_rake) + around(0.0, 12.0, rng)).clamp(12.0, 88.0),
@@ -143,9 +149,9 @@ impl Cabin {
 
 impl Hull {
     fn random(typical: &Typical, character: &Character, rng: &mut impl Rng) -> Self {
-        let [bonnet, belt, deck] = typical.heights;
+        let [bonnet, belt, deck] = typical.heights.map(|height| height + character.waist);
         Self {
-            bonnet: around(bonnet, 0.05, rng),
+            bonnet: around(bonnet, 0.05, rng).min(0.97),
             belt: around(belt, 0.04, rng),
             wedge: rng.random_range(-0.01..0.05),
             deck: around(deck, 0.06, rng).min(0.97),

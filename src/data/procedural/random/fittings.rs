@@ -28,7 +28,7 @@ impl Fittings {
             bed_depth,
             spoiler_height: if_drawn(if sporty { 0.3 } else { 0.0 }, 0.06..0.22, rng),
             roof_rail_height: if_drawn(if roomy { 0.35 } else { 0.0 }, 0.03..0.08, rng),
-            bumper_depth: if_drawn(if working { 0.6 } else { 0.25 }, 0.04..0.16, rng),
+            bumper_depth: if_drawn(if working { 0.6 } else { 0.3 }, 0.04..0.16, rng),
             roof_load: if rng.random_bool(0.14) && !open { roof_load } else { [0.0; 3] },
             spare_wheel: rng.random_bool(spare_chance),
         }
