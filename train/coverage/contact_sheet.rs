@@ -16,7 +16,7 @@ use object_pba::{
 use rayon::prelude::*;
 
 /// Pixels of a picture.
-const TILE: [u32; 2] = [132, 92];
+const TILE: [u32; 2] = [124, 86];
 /// Seen across a picture's width from three units away, in radians.
 const FIELD_OF_VIEW: f32 = 0.345;
 /// Grey of the background.

@@ -41,18 +41,18 @@ pub fn spoiler(profile: &Profile) -> Vec<Solid> {
     vec![wing, post(0.75 * half_width), post(-0.75 * half_width)]
 }
 
-/// Two rails along the roof, if the car has them.
+/// Two rails along the roof, if the car has them and the roof is long enough.
 pub fn roof_rails(profile: &Profile) -> Vec<Solid> {
     let height = profile.parameters.fittings.roof_rail_height;
-    if height == 0.0 {
+    let (start, end) = (profile.roof_start + 0.15, profile.roof_end - 0.3);
+    if height == 0.0 || end - start < 0.6 {
         return Vec::new();
     }
     // The roof narrows and falls towards its ends, so these decide.
-    let (start, end) = (profile.roof_start + 0.15, profile.roof_end - 0.3);
     let z = 0.5 * (start + end);
     let y = profile.top(start).min(profile.top(end)) + 0.4 * height;
     let x = profile.shoulder(start).min(profile.shoulder(end)) - 0.10;
-    let half_size = Vector3::new(0.022, height, 0.5 * (end - start).max(0.2));
+    let half_size = Vector3::new(0.022, height, 0.5 * (end - start));
     [x, -x].map(|x| superellipsoid(Point3::new(x, y, z), half_size, 0.35)).into()
 }
 

@@ -1,7 +1,7 @@
 //! Procedural cars: an endless family of closed, painted meshes with known shape.
 //!
 //! [`CarParameters`] state a shape; `profile` turns them into lines, `body` lofts cross-sections
-//! along the car, `fittings` adds wheels and other parts, and `livery` paints pictures that are
+//! along the car, `wheels` and `fittings` add parts, and `livery` paints pictures that are
 //! projected onto all of it. Shape and paint come from separate random streams, so that one shape
 //! can wear many paints.
 //!

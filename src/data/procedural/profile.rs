@@ -3,17 +3,19 @@
 //! In the workshop frame: metres, x to the car's right, y up from the ground, z backwards from the
 //! middle of the car.
 
+mod arches;
+mod plan;
+
 use super::{
     curve::{sample_polyline, smooth},
     parameters::{BodyStyle, CarParameters},
 };
+use arches::GAP;
+
+pub use arches::FLARE_WIDTH;
 
 /// Samples of the roof line.
 const N_SAMPLES: usize = 1001;
-/// Free space between a wheel and its arch, as a fraction of the wheel's radius.
-const ARCH_GAP: f32 = 0.13;
-/// How far around an arch its flare reaches, in metres.
-pub const FLARE_WIDTH: f32 = 0.12;
 /// Rounding of the upper edges of a truck's box, in metres.
 const BOX_EDGE: f32 = 0.04;
 
@@ -80,7 +82,7 @@ impl Profile {
             roof_end: along(roof_end),
             deck_start: along(deck_start),
             axles: [along(axles.front), along(axles.rear)],
-            arch_radius: axles.radius * (1.0 + ARCH_GAP),
+            arch_radius: axles.radius * (1.0 + GAP),
             nose_height,
             bonnet_height,
             deck_height,
@@ -115,22 +117,6 @@ impl Profile {
         (hull.belt + hull.wedge * (self.fraction(z) - 0.5)) * self.parameters.size.height
     }
 
-    /// Half the body's width at `z`, at the widest.
-    pub fn half_width(&self, z: f32) -> f32 {
-        self.half_width_in_plan(z) - self.edge_inset(z)
-    }
-
-    /// The same, without the rounding of the ends.
-    fn half_width_in_plan(&self, z: f32) -> f32 {
-        let t = self.fraction(z);
-        let ends = &self.parameters.ends;
-        let taper = ends.front_taper * ramp((0.25 - t) / 0.25).powf(2.2)
-            + ends.rear_taper * ramp((t - 0.75) / 0.25).powf(2.2);
-        let width_fraction = if self.in_box(z) { 1.0 } else { self.parameters.cabin.width };
-        let half_width = self.parameters.size.width / 2.0 * width_fraction;
-        half_width * (1.0 - taper)
-    }
-
     /// Half the body's width where the sides meet the roof, the bonnet or the deck.
     pub fn shoulder(&self, z: f32) -> f32 {
         self.cant(z).half_width
@@ -158,38 +144,6 @@ impl Profile {
         self.parameters.cabin.shelf * ramp((self.top(z) - self.belt(z) - 0.06) / 0.2)
     }
 
-    /// How far the edge of a wheel arch stands out of the side at `[y, z]`.
-    pub fn flare(&self, y: f32, z: f32) -> f32 {
-        let from_edge =
-            |axle: f32| (z - axle).hypot(y - self.parameters.axles.radius) - self.arch_radius;
-        let nearest = from_edge(self.axles[0]).min(from_edge(self.axles[1]));
-        self.parameters.hull.flare * ramp(1.0 - nearest / FLARE_WIDTH)
-    }
-
-    /// Height of the wheel arch over `z`, if there is one.
-    pub fn arch(&self, z: f32) -> Option<f32> {
-        self.axles.iter().find_map(|axle| {
-            let squared = self.arch_radius.powi(2) - (z - axle).powi(2);
-            // The arch's end, up to rounding, belongs to it.
-            (squared > -1e-4).then(|| self.parameters.axles.radius + squared.max(0.0).sqrt())
-        })
-    }
-
-    /// How far backwards the bow of the ends moves what stands at `[x, z]`.
-    pub fn bow(&self, x: f32, z: f32) -> f32 {
-        let ends = &self.parameters.ends;
-        // The bow fades out before the wheel arch, and too slowly for sections to cross.
-        let fade = |depth: f32, overhang: f32, bow: f32| {
-            let overhang = overhang.max(0.01);
-            bow.min(0.4 * overhang) * ramp(1.0 - depth / overhang).powi(2)
-        };
-        let front_overhang = self.axles[0] - self.arch_radius - self.front;
-        let rear_overhang = self.rear - self.axles[1] - self.arch_radius;
-        let front = fade(z - self.front, front_overhang, ends.front_bow);
-        let rear = fade(self.rear - z, rear_overhang, ends.rear_bow);
-        (x / self.half_width_in_plan(z)).powi(2) * (front - rear)
-    }
-
     /// The load bed of a pickup or the cockpit of an open car, z, if there is one.
     pub fn bed(&self) -> Option<[f32; 2]> {
         match self.parameters.style {
@@ -206,13 +160,6 @@ impl Profile {
 
     fn fraction(&self, z: f32) -> f32 {
         ((z - self.front) / (self.rear - self.front)).clamp(0.0, 1.0)
-    }
-
-    /// A quarter round on the edges of both ends.
-    fn edge_inset(&self, z: f32) -> f32 {
-        let radius = self.parameters.ends.edge_radius;
-        let remaining = radius - (z - self.front).min(self.rear - z).clamp(0.0, radius);
-        radius - (radius * radius - remaining * remaining).max(0.0).sqrt()
     }
 }
 

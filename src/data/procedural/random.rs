@@ -34,8 +34,7 @@ impl Character {
         .map(|range| rng.random_range(range));
         let angular =
             rng.random_bool(if short { 0.5 } else { 0.3 }) || style == BodyStyle::BoxTruck;
-        let roundness = if angular { 0.08..0.4 } else { 0.4..1.15 };
-        let roundness = rng.random_range(roundness);
+        let roundness = rng.random_range(if angular { 0.08..0.4 } else { 0.4..1.15 });
         let waist = if short { rng.random_range(-0.11..0.04) } else { around(-0.01, 0.05, rng) };
         Self { stretch, tallness, waist, roundness }
     }
@@ -63,7 +62,7 @@ impl CarParameters {
         let hull = Hull::random(&typical, &character, rng);
         // The front arches must end below the bonnet and behind the nose.
         let largest_radius = (0.43 * (hull.bonnet - ends.bonnet_fall) * size.height)
-            .min(0.8 * typical.axles[0] * size.length);
+            .min(0.72 * typical.axles[0] * size.length);
         let largest_growth = if character.stretch < 0.9 { 1.35 } else { 1.12 };
         let radius = (wheel_radius * rng.random_range(0.9..largest_growth)).min(largest_radius);
 
