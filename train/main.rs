@@ -4,6 +4,7 @@ use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Args, Parser, Subcommand};
 use inspect::InspectArguments;
+use coverage::CoverageArguments;
 use object_pba::{
     Error, Result,
     device::Backend,
@@ -13,6 +14,7 @@ use render::RenderArguments;
 use selection::SelectionArguments;
 
 mod inspect;
+mod coverage;
 mod render;
 mod selection;
 
@@ -42,6 +44,8 @@ enum Command {
     All(Arguments),
     /// Render sequences with their ground truth.
     Render(RenderArguments),
+    /// Measure how far real cars are from the procedural family.
+    Coverage(CoverageArguments),
 }
 
 /// Interrupt training whenever you like: the same command goes on from its last checkpoint.
@@ -75,6 +79,7 @@ fn main() -> ExitCode {
         Command::Regressors(arguments) => train(&arguments, false, true),
         Command::All(arguments) => train(&arguments, true, true),
         Command::Render(arguments) => render::render(&arguments),
+        Command::Coverage(arguments) => coverage::coverage(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

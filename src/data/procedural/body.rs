@@ -5,27 +5,28 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use nalgebra::Point3;
 
 use super::{
-    profile::{Cant, Profile},
+    profile::{Cant, FLARE_WIDTH, Profile},
     solid::{Solid, loft},
 };
 
 /// Sections between the ends, before those that features add.
-const N_SECTIONS: usize = 60;
+const N_SECTIONS: usize = 34;
 /// Sizes of the smaller copies of the end section that close an end.
 const CAP_SCALES: [f32; 4] = [0.85, 0.65, 0.4, 0.2];
 /// Space beside a tyre in its arch, in metres.
 const ARCH_DEPTH_GAP: f32 = 0.04;
 
 /// Columns of half a section from the middle of the floor to the middle of the roof.
-const N_FLOOR: usize = 4;
-const N_ARCH_WALL: usize = 3;
-const N_ARCH_ROOF: usize = 3;
-const N_SIDE: usize = 10;
-const N_WINDOW: usize = 7;
+const N_FLOOR: usize = 2;
+const N_ARCH_WALL: usize = 2;
+const N_ARCH_ROOF: usize = 2;
+const N_SIDE: usize = 6;
+const N_SHELF: usize = 1;
+const N_WINDOW: usize = 3;
 const N_CANT: usize = 4;
 const N_ROOF: usize = 8;
 const N_UNDER: usize = N_FLOOR + N_ARCH_WALL + N_ARCH_ROOF;
-const N_HALF: usize = N_UNDER + N_SIDE + N_WINDOW + N_CANT + N_ROOF;
+const N_HALF: usize = N_UNDER + N_SIDE + N_SHELF + N_WINDOW + N_CANT + N_ROOF;
 
 /// The shell, without wheels and fittings, in the workshop frame.
 pub fn body(profile: &Profile) -> Solid {
@@ -40,7 +41,7 @@ pub fn body(profile: &Profile) -> Solid {
     rings.extend(sections.iter().cloned());
     rings.extend(CAP_SCALES.iter().map(|&scale| scaled(last, scale)));
     for point in rings.iter_mut().flatten() {
-        point.z += profile.bow(point.x / profile.half_width(point.z).max(0.1), point.z);
+        point.z += profile.bow(point.x, point.z);
     }
     loft(&rings)
 }
@@ -57,19 +58,24 @@ pub fn is_upper_side(column: usize) -> bool {
 
 /// Where sections stand, z: evenly along the roof line, and closer where edges want to be crisp.
 fn stations(profile: &Profile) -> Vec<f32> {
-    let Profile { front, rear, arch_radius, .. } = *profile;
+    let Profile { front, rear, arch_radius, cowl, roof_start, roof_end, deck_start, .. } = *profile;
     let edge = profile.parameters.ends.edge_radius;
-    let mut crisp = Vec::new();
+    let mut crisp = vec![cowl, roof_start, roof_end, deck_start];
     for step in 0..=5 {
         let depth = edge * (1.0 - (step as f32 / 5.0 * FRAC_PI_2).cos());
         crisp.extend([front + depth, rear - depth]);
     }
     for axle in profile.axles {
         crisp.extend([-1.0, 1.0].map(|side| axle + side * (arch_radius + 0.006)));
-        crisp.extend((0..=12).map(|step| axle - arch_radius * (step as f32 / 12.0 * PI).cos()));
+        crisp.extend([-1.0, 1.0].map(|side| axle + side * (arch_radius + FLARE_WIDTH)));
+        crisp.extend((0..=8).map(|step| axle - arch_radius * (step as f32 / 8.0 * PI).cos()));
     }
     if let Some([start, end]) = profile.bed() {
         crisp.extend([start - 0.008, start, end, end + 0.008]);
+    }
+
+    if profile.in_box(rear) {
+        crisp.push(roof_end - 0.008);
     }
 
     let mut stations = evenly_along_roof_line(profile);
@@ -110,17 +116,18 @@ fn half_section(profile: &Profile, z: f32) -> Vec<[f32; 2]> {
     let (top, bottom, width) = (profile.top(z), profile.bottom(z), profile.half_width(z));
     let belt = profile.belt(z).min(top - 0.06);
     let arch = profile.arch(z);
-    let side_bottom = arch.unwrap_or(bottom + 0.01).min(belt - 0.05);
+    // The floor of a lifted car passes over the arches' ends.
+    let side_bottom = arch.unwrap_or(0.0).max(bottom + 0.01).min(belt - 0.05);
     let arch_wall = parameters.size.width / 2.0 - parameters.axles.tyre_width - ARCH_DEPTH_GAP;
     let arch_wall = arch_wall.min(0.85 * width);
     let floor = if arch.is_some() { arch_wall } else { 0.9 * arch_wall };
     let Cant { half_width: cant_width, radius } = profile.cant(z);
-    // The side is a function of height alone, so that it runs straight over arches, and so that
-    // sections of different height follow each other without steps.
+    // But for flares, the side is a function of height alone, so that it runs straight over arches,
+    // and so that sections of different height follow each other without steps.
     let side_at = |y: f32| {
         let height = ((y - bottom) / (profile.belt(z) - bottom)).clamp(0.0, 1.0);
         let bulge = 0.5 * parameters.hull.bulge * (PI * height).sin();
-        width * (0.965 + 0.028 * height + bulge)
+        width * (0.965 + 0.028 * height + bulge) + profile.flare(y, z)
     };
 
     let mut half = Vec::with_capacity(N_HALF + 1);
@@ -132,7 +139,11 @@ fn half_section(profile: &Profile, z: f32) -> Vec<[f32; 2]> {
         N_ARCH_ROOF,
     ));
     half.extend(segment([0.0, side_bottom], [0.0, belt], N_SIDE).map(|[_, y]| [side_at(y), y]));
-    half.extend(segment([side_at(belt), belt], [cant_width, top - radius], N_WINDOW));
+    half.push([side_at(belt), belt]);
+    let window_foot = [side_at(belt) - profile.shelf(z), belt + 0.01];
+    // The side reaches its full width at the belt, which is above the bonnet.
+    let cant_width = cant_width.min(window_foot[0]);
+    half.extend(segment(window_foot, [cant_width, top - radius], N_WINDOW));
     half.extend((0..N_CANT).map(|step| {
         let (sine, cosine) = (step as f32 / N_CANT as f32 * FRAC_PI_2).sin_cos();
         [cant_width - radius * (1.0 - cosine), top - radius * (1.0 - sine)]
@@ -144,10 +155,11 @@ fn half_section(profile: &Profile, z: f32) -> Vec<[f32; 2]> {
 /// From the roof's edge at `half_width` to its middle: crowned, or sunk where a bed is.
 fn upper_side(profile: &Profile, z: f32, half_width: f32) -> [[f32; 2]; N_ROOF + 1] {
     let (top, parameters) = (profile.top(z), &profile.parameters);
-    if profile.bed().is_some_and(|[start, end]| (start..=end).contains(&z)) {
-        let floor = top - parameters.fittings.bed_depth;
-        let above_arches = parameters.axles.radius + profile.arch_radius + 0.04;
-        let floor = floor.max(above_arches).min(top - 0.05);
+    if let Some(bed) = profile.bed().filter(|[start, end]| (*start..=*end).contains(&z)) {
+        let over_axle = profile.axles.iter().any(|axle| (bed[0]..=bed[1]).contains(axle));
+        let arches = if over_axle { parameters.axles.radius + profile.arch_radius } else { 0.0 };
+        let lowest = arches.max(profile.bottom(z)) + 0.04;
+        let floor = (top - parameters.fittings.bed_depth).max(lowest).min(top - 0.05);
         let columns = [1.0, 0.95, 0.94, 0.93, 0.75, 0.55, 0.35, 0.18, 0.0];
         let heights = [top, top, 0.5 * (top + floor), floor, floor, floor, floor, floor, floor];
         return std::array::from_fn(|i| [half_width * columns[i], heights[i]]);

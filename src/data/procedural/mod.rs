@@ -1,7 +1,7 @@
 //! Procedural cars: an endless family of closed, painted meshes with known shape.
 //!
 //! [`CarParameters`] state a shape; `profile` turns them into lines, `body` lofts cross-sections
-//! along the car, `fittings` adds wheels and other parts, and `livery` paints pictures that are
+//! along the car, `wheels` and `fittings` add parts, and `livery` paints pictures that are
 //! projected onto all of it. Shape and paint come from separate random streams, so that one shape
 //! can wear many paints.
 //!
@@ -17,8 +17,10 @@ mod parameters;
 mod profile;
 mod random;
 mod solid;
+mod styles;
+mod wheels;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Isometry3;
 use rand::Rng;
 
 use self::{
@@ -64,10 +66,8 @@ impl CarParameters {
 struct Part {
     solid: Solid,
     skins: Vec<Skin>, // one a face
-    /// Where the part's origin stands in the workshop frame.
-    origin: Vector3<f32>,
-    /// Turned by half a turn about the vertical, as wheels on the left are.
-    turned: bool,
+    /// From the part's own frame, in which it is painted, into the workshop frame.
+    pose: Isometry3<f32>,
 }
 
 /// How a face is painted.
@@ -77,29 +77,40 @@ enum Skin {
     Picture(View),
 }
 
+impl Part {
+    /// A part of one colour, in the workshop frame.
+    fn plain(solid: Solid, color: [f32; 3]) -> Self {
+        let skins = vec![Skin::Plain(color); solid.faces.len()];
+        Self { solid, skins, pose: Isometry3::identity() }
+    }
+}
+
 fn parts(profile: &Profile, livery: &Livery) -> Vec<Part> {
     let body = body(profile);
     let skins = body.faces.iter().map(|face| body_skin(profile, livery, &body, face)).collect();
-    let mut parts = vec![Part { solid: body, skins, origin: Vector3::zeros(), turned: false }];
+    let mut parts = vec![Part { solid: body, skins, pose: Isometry3::identity() }];
 
-    let wheel = fittings::wheel(profile);
+    let wheel = wheels::wheel(profile);
     let skins: Vec<_> = wheel.faces.iter().map(|face| wheel_skin(&wheel, face)).collect();
-    parts.extend(fittings::wheel_places(profile).map(|(origin, on_the_right)| Part {
+    parts.extend(wheels::wheel_poses(profile).into_iter().map(|pose| Part {
         solid: wheel.clone(),
         skins: skins.clone(),
-        origin,
-        turned: !on_the_right,
+        pose,
     }));
 
-    let plain = |solid: Solid, color| Part {
-        skins: vec![Skin::Plain(color); solid.faces.len()],
-        solid,
-        origin: Vector3::zeros(),
-        turned: false,
-    };
-    parts.extend(fittings::mirrors(profile).into_iter().map(|part| plain(part, livery.paint)));
-    parts.extend(fittings::spoiler(profile).into_iter().map(|part| plain(part, livery.paint)));
-    parts.extend(fittings::roof_rails(profile).into_iter().map(|part| plain(part, livery.accent)));
+    let plain: [(Vec<Solid>, [f32; 3]); 8] = [
+        (wheels::axle_rods(profile), UNDERSIDE),
+        (fittings::mirrors(profile), livery.paint),
+        (fittings::spoiler(profile), livery.paint),
+        (fittings::roof_rails(profile), livery.accent),
+        (fittings::bumpers(profile), livery.bumper),
+        (fittings::roof_load(profile), livery.roof_load),
+        (fittings::free_windscreen(profile), livery.glass),
+        (fittings::seats(profile), livery.trim),
+    ];
+    for (solids, color) in plain {
+        parts.extend(solids.into_iter().map(|solid| Part::plain(solid, color)));
+    }
     parts
 }
 
@@ -109,7 +120,7 @@ fn body_skin(profile: &Profile, livery: &Livery, body: &Solid, face: &Face) -> S
     let normal = (b - a).cross(&(c - a)).normalize();
     let middle = (a.coords + b.coords + c.coords) / 3.0;
     // Where the section stood before the ends were bowed.
-    let z = middle.z - profile.bow(middle.x / profile.half_width(middle.z), middle.z);
+    let z = middle.z - profile.bow(middle.x, middle.z);
     let at_an_end = z < profile.front + 0.15 || z > profile.rear - 0.15;
     if normal.y < -0.6 || (is_underside(face.column) && !at_an_end) {
         return Skin::Plain(UNDERSIDE);
@@ -135,11 +146,7 @@ fn wheel_skin(wheel: &Solid, face: &Face) -> Skin {
 
 fn add_part(mesh: &mut Mesh, part: &Part, pictures: &Pictures) {
     let first = mesh.vertices.len() as u32;
-    let place = |point: &Point3<f32>| {
-        let turned = if part.turned { Point3::new(-point.x, point.y, -point.z) } else { *point };
-        turned + part.origin
-    };
-    mesh.vertices.extend(part.solid.vertices.iter().map(place));
+    mesh.vertices.extend(part.solid.vertices.iter().map(|point| part.pose * point));
     mesh.triangles.extend(part.solid.faces.iter().zip(&part.skins).map(|(face, &skin)| {
         let vertices = face.vertices.map(|vertex| first + vertex);
         match skin {

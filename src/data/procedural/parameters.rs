@@ -1,4 +1,4 @@
-//! The shape of a car in some thirty numbers.
+//! The shape of a car in some forty numbers.
 
 /// Kinds of car. A kind sets the typical proportions; each car varies around them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,6 +10,20 @@ pub enum BodyStyle {
     Pickup,
     Van,
     Coupe,
+    /// A roof that slopes down to a high tail.
+    Fastback,
+    /// Upright and high off the ground.
+    OffRoader,
+    /// One box with a sloping nose.
+    Minivan,
+    /// Short, narrow and tall.
+    Microcar,
+    /// A cab before a higher and wider box.
+    BoxTruck,
+    /// A long box, glazed all along.
+    Bus,
+    /// An open two-seater behind a windscreen.
+    Roadster,
 }
 
 /// The shape of one car. Paint is not part of it.
@@ -24,7 +38,7 @@ pub struct CarParameters {
     pub fittings: Fittings,
 }
 
-/// Outer dimensions, in metres.
+/// Outer dimensions of the body, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
     pub length: f32,
@@ -39,6 +53,8 @@ pub struct Size {
 pub struct Axles {
     pub radius: f32,
     pub tyre_width: f32,
+    /// How far the tyres stand out of the sides; negative where they stand inside.
+    pub stance: f32,
     pub front: f32,
     pub rear: f32,
 }
@@ -56,8 +72,15 @@ pub struct Cabin {
     pub roof_fall: f32,
     /// How far the sides lean in, as a fraction of the half width.
     pub tumblehome: f32,
+    /// How far the windows stand inside the shoulders under them, in metres.
+    pub shelf: f32,
     /// Rise of the roof from its edges to its middle, in metres.
     pub crown: f32,
+    /// Rounding of the edge between side and roof, at most, as a fraction of the height.
+    pub cant: f32,
+    /// Height and width as fractions of the car's: less than 1 before the box of a truck.
+    pub height: f32,
+    pub width: f32,
 }
 
 /// The lower body: heights as fractions of the car's height.
@@ -73,6 +96,8 @@ pub struct Hull {
     pub deck: f32,
     /// Outward bulge of the doors, as a fraction of the half width.
     pub bulge: f32,
+    /// How far the edges of the wheel arches stand out, in metres.
+    pub flare: f32,
     /// How widely the side profile rounds its corners, as a fraction of the length.
     pub softness: f32,
 }
@@ -82,7 +107,7 @@ pub struct Hull {
 pub struct Ends {
     /// Fall of the bonnet towards the nose, as a fraction of the height.
     pub bonnet_fall: f32,
-    /// Height of the nose, as a fraction of the bonnet's.
+    /// Height of the nose, as a fraction of that of the bonnet's front edge.
     pub nose: f32,
     /// Height of the tail, as a fraction of the deck's.
     pub tail: f32,
@@ -100,7 +125,14 @@ pub struct Ends {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fittings {
     pub mirror: f32,
+    /// Of a pickup's bed, or of an open cockpit.
     pub bed_depth: f32,
     pub spoiler_height: f32,
     pub roof_rail_height: f32,
+    /// How far bumper bars stand out.
+    pub bumper_depth: f32,
+    /// `[width, height, length]` of a sign, a light bar or a luggage box on the roof.
+    pub roof_load: [f32; 3],
+    /// Whether a wheel hangs on the tailgate.
+    pub spare_wheel: bool,
 }

@@ -1,121 +1,186 @@
 //! How the shapes of cars are distributed.
 
-use rand::{Rng, distr::weighted::WeightedIndex};
+mod fittings;
 
-use super::parameters::{Axles, BodyStyle, Cabin, CarParameters, Ends, Fittings, Hull, Size};
+use std::ops::Range;
+
+use rand::Rng;
+
+use super::{
+    parameters::{Axles, BodyStyle, Cabin, CarParameters, Ends, Fittings, Hull, Size},
+    styles::Typical,
+};
+
+/// What sets a car apart from its kind as a whole.
+struct Character {
+    /// Length and height as multiples of the typical ones: small cars are short and tall.
+    stretch: f32,
+    tallness: f32,
+    /// Rise of bonnet, belt and deck, as a fraction of the height.
+    waist: f32,
+    /// From angular, about 0.1, to round, about 1.
+    roundness: f32,
+}
+
+impl Character {
+    fn random(style: BodyStyle, rng: &mut impl Rng) -> Self {
+        let short = rng.random_bool(0.28) && style != BodyStyle::Microcar;
+        let long = rng.random_bool(0.35) && style.is_commercial();
+        let [stretch, tallness] = match (short, long) {
+            (true, _) => [0.66..0.95, 0.95..1.2],
+            (false, true) => [1.05..1.4, 0.9..1.1],
+            (false, false) => [0.9..1.1, 0.9..1.12],
+        }
+        .map(|range| rng.random_range(range));
+        let angular =
+            rng.random_bool(if short { 0.5 } else { 0.3 }) || style == BodyStyle::BoxTruck;
+        let roundness = rng.random_range(if angular { 0.08..0.4 } else { 0.4..1.15 });
+        let waist = if short { rng.random_range(-0.11..0.04) } else { around(-0.01, 0.05, rng) };
+        Self { stretch, tallness, waist, roundness }
+    }
+}
 
 impl CarParameters {
     /// Draws a car: its style first, then its proportions around the style's typical ones.
     pub fn random(rng: &mut impl Rng) -> Self {
-        const STYLES: [(BodyStyle, u32); 7] = [
-            (BodyStyle::Sedan, 22),
-            (BodyStyle::Hatchback, 17),
-            (BodyStyle::Wagon, 12),
-            (BodyStyle::Suv, 18),
-            (BodyStyle::Pickup, 9),
-            (BodyStyle::Van, 9),
-            (BodyStyle::Coupe, 13),
-        ];
-        let shares = WeightedIndex::new(STYLES.map(|(_, share)| share));
-        let style = STYLES[rng.sample(shares.expect("the shares are positive"))].0;
+        let style = BodyStyle::random(rng);
         Self::random_of_style(style, rng)
     }
 
     /// Draws a car of the given style.
     pub fn random_of_style(style: BodyStyle, rng: &mut impl Rng) -> Self {
-        let (size, wheel_radius, cabin_line, heights) = typical(style);
-        let [length, width, height, clearance] = size;
-        let [front_axle, cowl, windscreen_rake, roof_end, rear_rake, rear_axle] = cabin_line;
-        let [bonnet, belt, deck, tumblehome] = heights;
-        let bonnet_fall = rng.random_range(0.04..0.13);
-        let height = around(height, 0.12, rng);
-        let bonnet = around(bonnet, 0.04, rng);
-        // The front arches must end below the bonnet.
-        let largest_radius = 0.43 * (bonnet - bonnet_fall) * height;
-        let sporty = matches!(style, BodyStyle::Coupe | BodyStyle::Sedan);
-        let roomy = matches!(style, BodyStyle::Suv | BodyStyle::Wagon | BodyStyle::Van);
+        let typical = style.typical();
+        let character = Character::random(style, rng);
+        let [length, width, height, clearance, wheel_radius] = typical.size;
+        let size = Size {
+            length: length * character.stretch,
+            width: width * around(1.0, 0.08, rng),
+            height: height * character.tallness,
+            clearance: around(clearance, 0.05, rng),
+        };
+        let ends = Ends::random(&character, rng);
+        let hull = Hull::random(&typical, &character, rng);
+        // The front arches must end below the bonnet and behind the nose.
+        let largest_radius = (0.43 * (hull.bonnet - ends.bonnet_fall) * size.height)
+            .min(0.72 * typical.axles[0] * size.length);
+        let largest_growth = if character.stretch < 0.9 { 1.35 } else { 1.12 };
+        let radius = (wheel_radius * rng.random_range(0.9..largest_growth)).min(largest_radius);
 
-        Self {
+        let car = Self {
             style,
-            size: Size {
-                length: around(length, 0.45, rng),
-                width: around(width, 0.11, rng),
-                height,
-                clearance: around(clearance, 0.04, rng),
-            },
-            axles: Axles {
-                radius: around(wheel_radius, 0.04, rng).min(largest_radius),
-                tyre_width: rng.random_range(0.18..0.26),
-                front: around(front_axle, 0.015, rng),
-                rear: around(rear_axle, 0.02, rng),
-            },
-            cabin: Cabin {
-                cowl: around(cowl, 0.03, rng),
-                windscreen_rake: around(windscreen_rake, 6.0, rng),
-                roof_end: around(roof_end, 0.035, rng).min(0.965),
-                rear_rake: around(rear_rake, 9.0, rng).min(86.0),
-                roof_fall: rng.random_range(0.0..if roomy { 0.04 } else { 0.07 }),
-                tumblehome: around(tumblehome, 0.07, rng),
-                crown: rng.random_range(0.015..0.05),
-            },
+            size,
+            axles: Axles::random(&typical, radius, rng),
+            cabin: Cabin::random(style, &typical, &character, rng),
+            hull,
+            ends,
+            fittings: Fittings::random(style, rng),
+        };
+        let lift = rng.random_range(0.08..0.4);
+        if style.is_rugged() && rng.random_bool(0.35) { car.lifted(lift) } else { car }
+    }
+
+    /// The same body, higher above the wheels by `rise` metres.
+    fn lifted(self, rise: f32) -> Self {
+        let height = self.size.height + rise;
+        let raised = |fraction: f32| (fraction * self.size.height + rise) / height;
+        let Self { hull, ends, .. } = self;
+        Self {
+            size: Size { height, clearance: self.size.clearance + 0.8 * rise, ..self.size },
+            axles: Axles { radius: self.axles.radius + 0.2 * rise, ..self.axles },
             hull: Hull {
-                bonnet,
-                belt: around(belt, 0.03, rng),
-                wedge: rng.random_range(0.0..0.05),
-                deck: around(deck, 0.04, rng),
-                bulge: rng.random_range(0.01..0.05),
-                softness: rng.random_range(0.006..0.014),
+                bonnet: raised(hull.bonnet),
+                belt: raised(hull.belt),
+                deck: raised(hull.deck),
+                ..hull
             },
-            ends: Ends {
-                bonnet_fall,
-                nose: rng.random_range(0.70..0.84),
-                tail: rng.random_range(0.86..0.99),
-                front_taper: rng.random_range(0.06..0.20),
-                rear_taper: rng.random_range(0.03..0.13),
-                front_bow: rng.random_range(0.05..0.20),
-                rear_bow: rng.random_range(0.03..0.12),
-                edge_radius: rng.random_range(0.05..0.11),
-            },
-            fittings: Fittings {
-                mirror: rng.random_range(0.10..0.15),
-                bed_depth: draw_if(style == BodyStyle::Pickup, 0.32..0.45, rng),
-                spoiler_height: draw_if(sporty && rng.random_bool(0.3), 0.06..0.18, rng),
-                roof_rail_height: draw_if(roomy && rng.random_bool(0.45), 0.03..0.07, rng),
-            },
+            ends: Ends { nose: raised(ends.nose), tail: raised(ends.tail), ..ends },
+            ..self
         }
     }
 }
 
-/// Typical proportions of a style:
-/// `[length, width, height, clearance]` and the wheels' radius, in metres;
-/// `[front axle, cowl, windscreen rake, roof end, rear rake, rear axle]` and
-/// `[bonnet, belt, deck, tumblehome]`, as [`CarParameters`] has them.
-#[rustfmt::skip] // A table.
-fn typical(style: BodyStyle) -> ([f32; 4], f32, [f32; 6], [f32; 4]) {
-    match style {
-        BodyStyle::Sedan =>
-            ([4.70, 1.82, 1.45, 0.15], 0.33, [0.195, 0.285, 29., 0.70, 27., 0.785], [0.66, 0.64, 0.73, 0.24]),
-        BodyStyle::Hatchback =>
-            ([4.00, 1.75, 1.49, 0.15], 0.31, [0.200, 0.260, 32., 0.86, 58., 0.830], [0.65, 0.63, 0.64, 0.22]),
-        BodyStyle::Wagon =>
-            ([4.75, 1.82, 1.49, 0.15], 0.33, [0.190, 0.285, 30., 0.90, 57., 0.780], [0.65, 0.63, 0.64, 0.22]),
-        BodyStyle::Suv =>
-            ([4.60, 1.89, 1.72, 0.21], 0.37, [0.195, 0.270, 37., 0.90, 66., 0.790], [0.64, 0.62, 0.63, 0.18]),
-        BodyStyle::Pickup =>
-            ([5.35, 1.95, 1.83, 0.24], 0.39, [0.175, 0.265, 40., 0.57, 78., 0.785], [0.63, 0.63, 0.67, 0.17]),
-        BodyStyle::Van =>
-            ([5.00, 1.94, 2.00, 0.18], 0.34, [0.180, 0.165, 44., 0.96, 83., 0.790], [0.58, 0.57, 0.58, 0.12]),
-        BodyStyle::Coupe =>
-            ([4.45, 1.86, 1.30, 0.13], 0.34, [0.205, 0.335, 27., 0.62, 20., 0.790], [0.67, 0.66, 0.73, 0.28]),
+impl Axles {
+    fn random(typical: &Typical, radius: f32, rng: &mut impl Rng) -> Self {
+        let [front, rear] = typical.axles;
+        let wide = rng.random_bool(0.2);
+        Self {
+            radius,
+            tyre_width: rng.random_range(0.17..0.28),
+            stance: if wide { rng.random_range(0.02..0.14) } else { around(0.0, 0.03, rng) },
+            front: around(front, 0.03, rng),
+            rear: around(rear, 0.04, rng),
+        }
+    }
+}
+
+impl Cabin {
+    fn random(
+        style: BodyStyle,
+        typical: &Typical,
+        character: &Character,
+        rng: &mut impl Rng,
+    ) -> Self {
+        let [cowl, windscreen_rake, roof_end, rear_rake, tumblehome] = typical.cabin;
+        // A shorter, taller car has steeper windows.
+        let steeper = |rake: f32| {
+            let slope = rake.to_radians().tan() * character.tallness / character.stretch;
+            slope.atan().to_degrees()
+        };
+        let roomy = !style.has_deck();
+        let boxed = style == BodyStyle::BoxTruck;
+        let widest_shelf = if character.roundness < 0.4 { 0.13 } else { 0.05 };
+        let cowl_spread = if style == BodyStyle::Van { 0.08 } else { 0.04 };
+        Self {
+            cowl: around(cowl, cowl_spread, rng).max(0.06),
+            windscreen_rake: (steeper(windscreen_rake) + around(0.0, 8.0, rng)).min(84.0),
+            roof_end: around(roof_end, 0.05, rng).min(0.97),
+            rear_rake: (steeper(rear_rake) + around(0.0, 12.0, rng)).clamp(12.0, 88.0),
+            roof_fall: rng.random_range(0.0..if roomy { 0.04 } else { 0.07 }),
+            tumblehome: around(tumblehome, 0.08, rng).max(0.0),
+            shelf: rng.random_range(0.0..widest_shelf),
+            crown: character.roundness * rng.random_range(0.015..0.05),
+            cant: character.roundness * rng.random_range(0.05..0.10),
+            height: if boxed { rng.random_range(0.68..0.92) } else { 1.0 },
+            width: if boxed { rng.random_range(0.84..1.0) } else { 1.0 },
+        }
+    }
+}
+
+impl Hull {
+    fn random(typical: &Typical, character: &Character, rng: &mut impl Rng) -> Self {
+        let [bonnet, belt, deck] = typical.heights.map(|height| height + character.waist);
+        Self {
+            bonnet: around(bonnet, 0.05, rng).min(0.97),
+            belt: around(belt, 0.04, rng),
+            wedge: rng.random_range(-0.01..0.05),
+            deck: around(deck, 0.06, rng).min(0.97),
+            bulge: character.roundness * rng.random_range(0.01..0.05),
+            flare: if rng.random_bool(0.4) { rng.random_range(0.01..0.09) } else { 0.0 },
+            softness: character.roundness * rng.random_range(0.008..0.014),
+        }
+    }
+}
+
+impl Ends {
+    fn random(character: &Character, rng: &mut impl Rng) -> Self {
+        let mut rounded = |range: Range<f32>| character.roundness * rng.random_range(range);
+        let [front_taper, rear_taper] = [rounded(0.05..0.22), rounded(0.02..0.15)];
+        let [front_bow, rear_bow] = [rounded(0.05..0.22), rounded(0.02..0.14)];
+        let edge_radius = rounded(0.05..0.11).max(0.015);
+        Self {
+            bonnet_fall: rng.random_range(0.01..0.13),
+            nose: rng.random_range(0.76..0.97),
+            tail: rng.random_range(0.86..0.99),
+            front_taper,
+            rear_taper,
+            front_bow,
+            rear_bow,
+            edge_radius,
+        }
     }
 }
 
 /// Bell-shaped (triangular) within `spread` of `center`.
 fn around(center: f32, spread: f32, rng: &mut impl Rng) -> f32 {
     center + spread * (rng.random::<f32>() + rng.random::<f32>() - 1.0)
-}
-
-fn draw_if(present: bool, range: std::ops::Range<f32>, rng: &mut impl Rng) -> f32 {
-    let value = rng.random_range(range);
-    if present { value } else { 0.0 }
 }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::data::procedural::solid::tests::{check_closed, signed_volume};
 
-const N_CARS: u64 = 60;
+const N_CARS: u64 = 200;
 
 fn shapes() -> impl Iterator<Item = CarParameters> {
     (0..N_CARS).map(|seed| CarParameters::random(&mut keyed_rng(seed, [0, 0])))
@@ -27,8 +27,8 @@ fn cars_stand_in_the_world_frame() {
         let size = bounds.max - bounds.min;
         assert!(bounds.center().coords.norm() < 1e-5);
         assert!((bounds.diagonal() - 1.0).abs() < 1e-5);
-        assert!(size.z > 1.6 * size.x && size.x > 0.7 * size.y, "{size}");
-        assert!((8_000..25_000).contains(&mesh.triangles.len()), "{}", mesh.triangles.len());
+        assert!(size.z > 1.2 * size.x && size.x > 0.6 * size.y, "{size}");
+        assert!((5_000..13_000).contains(&mesh.triangles.len()), "{}", mesh.triangles.len());
     }
 }
 
@@ -63,20 +63,46 @@ fn the_same_seed_makes_the_same_car() {
 #[test]
 fn sections_follow_each_other_without_crossing() {
     for shape in shapes() {
-        let profile = Profile::new(&shape);
-        let body = body(&profile);
-        let outside = |face: &&Face| {
-            !(is_underside(face.column) || profile.bed().is_some() && is_upper_side(face.column))
-        };
-        // Where sections crossed, faces would look back at the spine of the car.
-        for face in body.faces.iter().filter(outside) {
-            let [a, b, c] = body.corners(face);
-            let normal = (b - a).cross(&(c - a)).normalize();
-            let middle = Point3::from((a.coords + b.coords + c.coords) / 3.0);
-            let height = 0.5 * (profile.top(middle.z) + profile.bottom(middle.z));
-            let along = middle.z.clamp(profile.front + 0.5, profile.rear - 0.5);
-            let outwards = (middle - Point3::new(0.0, height, along)).normalize();
-            assert!(normal.dot(&outwards) > 0.0, "{shape:?} at {middle}: {normal}");
+        let body = body(&Profile::new(&shape));
+        let n_columns = 1 + body.faces.iter().map(|face| face.column).max().expect("faces");
+        let sections: Vec<_> = body.vertices.chunks_exact(n_columns).collect();
+        for (one, next) in sections.iter().zip(&sections[1..]) {
+            let in_order = one.iter().zip(*next).all(|(a, b)| a.z < b.z + 1e-5);
+            assert!(in_order, "{shape:?} at {}", one[0]);
         }
     }
+}
+
+#[test]
+fn windows_stand_on_the_sides_and_carry_the_roof() {
+    for shape in shapes() {
+        let profile = Profile::new(&shape);
+        let length = profile.rear - profile.front;
+        for z in (1..100).map(|step| profile.front + length * step as f32 / 100.0) {
+            let cant = profile.cant(z);
+            assert!(cant.half_width > 0.3 * profile.half_width(z), "{shape:?} at {z}");
+            assert!(profile.top(z) - cant.radius > profile.bottom(z) + 0.1, "{shape:?} at {z}");
+        }
+    }
+}
+
+#[test]
+fn the_box_of_a_truck_is_higher_and_wider_than_its_cab() {
+    for seed in 0..20 {
+        let mut rng = keyed_rng(seed, [0, 0]);
+        let profile = Profile::new(&CarParameters::random_of_style(BodyStyle::BoxTruck, &mut rng));
+        let (cab, cargo) = (profile.roof_end - 0.05, profile.roof_end + 0.05);
+        assert!(profile.top(cab) < profile.top(cargo));
+        assert!(profile.half_width(cab) <= profile.half_width(cargo));
+    }
+}
+
+#[test]
+fn three_in_four_are_passenger_cars() {
+    let mut rng = keyed_rng(0, [0, 0]);
+    let n_others = (0..4000)
+        .map(|_| BodyStyle::random(&mut rng))
+        .filter(|style| style.is_commercial() || *style == BodyStyle::Pickup)
+        .count();
+    assert!((700..1200).contains(&n_others), "{n_others}");
 }

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::data::procedural::{
     canvas::{Canvas, Color, Place, rectangle, superellipse},
-    parameters::BodyStyle,
+    parameters::{BodyStyle, CarParameters},
     profile::Profile,
 };
 
@@ -17,6 +17,8 @@ const PLATE: Place = [0.26, 0.06];
 impl Livery {
     pub(super) fn front(&self, profile: &Profile) -> Canvas {
         let mut canvas = self.blank_end(profile);
+        let CarParameters { size, cabin, .. } = profile.parameters;
+        self.paint_box(&mut canvas, profile, cabin.height * size.height + 0.02);
         self.paint_bumper(&mut canvas, profile, 0.62 * profile.nose_height);
         self.paint_grille(&mut canvas, profile);
         let (y, half_height) = self.headlamp(profile);
@@ -36,17 +38,17 @@ impl Livery {
     pub(super) fn rear(&self, profile: &Profile) -> Canvas {
         let mut canvas = self.blank_end(profile);
         let bumper_top = 0.55 * profile.deck_height;
+        self.paint_box(&mut canvas, profile, bumper_top);
         self.paint_bumper(&mut canvas, profile, bumper_top);
         let gap = darker(self.paint, 0.3);
         let outer = profile.parameters.size.width / 2.0;
         let width = 0.86 * outer;
         canvas.trace(&[[-outer, bumper_top], [outer, bumper_top]], GAP_WIDTH, gap);
-        let upright = match profile.parameters.style {
-            BodyStyle::Sedan | BodyStyle::Coupe | BodyStyle::Pickup => profile.deck_height,
-            _ => profile.parameters.size.height,
-        };
+        let style = profile.parameters.style;
+        let upright =
+            if style.has_deck() { profile.deck_height } else { profile.parameters.size.height };
         canvas.outline(&rectangle([-width, bumper_top], [width, upright]), GAP_WIDTH, gap);
-        if profile.parameters.style == BodyStyle::Van {
+        if matches!(style, BodyStyle::Van | BodyStyle::BoxTruck) {
             canvas.trace(&[[0.0, bumper_top], [0.0, upright]], GAP_WIDTH, gap);
         }
         self.paint_tail_lamps(&mut canvas, profile);
@@ -66,10 +68,17 @@ impl Livery {
             canvas.fill(&superellipse(exhaust, [0.05, 0.022], 3.0), [0.02; 3]);
         }
         let outline: Vec<Place> = rear_window(profile).iter().map(|&[_, x, y]| [x, y]).collect();
-        if !(profile.parameters.style == BodyStyle::Van && self.detail.panel_van) {
+        if self.has_rear_window(profile) {
             self.paint_window(&mut canvas, &outline);
         }
         canvas
+    }
+
+    pub(super) fn has_rear_window(&self, profile: &Profile) -> bool {
+        match profile.parameters.style {
+            BodyStyle::Van => !self.detail.panel_van,
+            style => !matches!(style, BodyStyle::BoxTruck | BodyStyle::Roadster),
+        }
     }
 
     /// Middle and half height of the headlamps, y.
@@ -99,6 +108,13 @@ impl Livery {
             }
         }
         canvas
+    }
+
+    /// The walls of a truck's box, above `low`.
+    fn paint_box(&self, canvas: &mut Canvas, profile: &Profile, low: f32) {
+        if profile.in_box(profile.rear) {
+            canvas.fill(&rectangle([-2.0, low], [2.0, 9.0]), self.cargo);
+        }
     }
 
     fn paint_bumper(&self, canvas: &mut Canvas, profile: &Profile, top: f32) {

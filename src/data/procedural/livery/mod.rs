@@ -3,6 +3,7 @@
 //! A livery is independent of the shape: any of them fits any car.
 
 mod detail;
+mod doors;
 mod ends;
 mod side;
 mod top;
@@ -63,6 +64,12 @@ pub struct Livery {
     pub lamp: Color,
     pub tail_lamp: Color,
     pub plate: Color,
+    /// Bumper bars: trim, bright metal or paint.
+    pub bumper: Color,
+    /// What stands on the roof.
+    pub roof_load: Color,
+    /// The box of a truck.
+    pub cargo: Color,
     detail: Detail,
 }
 
@@ -70,17 +77,24 @@ impl Livery {
     pub fn random(rng: &mut impl Rng) -> Self {
         let paint = random_paint(rng);
         let bright = rng.random_range(0.55..0.9);
+        let trim = [rng.random_range(0.06..0.4); 3];
+        // Windows are dark from outside, but where the sky is reflected in them.
+        let glass = if rng.random_bool(0.2) { [0.55, 0.65, 0.70] } else { [0.10, 0.12, 0.15] };
+        let white = [rng.random_range(0.8..0.95); 3];
         Self {
             paint,
             roof: if rng.random_bool(0.2) { random_paint(rng) } else { paint },
             decal: random_paint(rng),
-            glass: darker([0.10, 0.12, 0.15], rng.random_range(0.6..1.8)),
-            trim: [rng.random_range(0.06..0.25); 3],
+            glass: darker(glass, rng.random_range(0.6..1.4)),
+            trim,
             accent: [if rng.random_bool(0.6) { bright } else { 0.08 }; 3],
-            rim: [rng.random_range(0.35..0.85); 3],
+            rim: [rng.random_range(0.15..0.85); 3],
             lamp: [0.95, 0.95, rng.random_range(0.80..0.95)],
             tail_lamp: [rng.random_range(0.55..0.85), 0.05, 0.05],
             plate: if rng.random_bool(0.3) { [0.95, 0.80, 0.2] } else { [0.92; 3] },
+            bumper: [trim, [bright; 3], paint][rng.random_range(0..3)],
+            roof_load: [trim, white, random_paint(rng)][rng.random_range(0..3)],
+            cargo: [paint, white, random_paint(rng)][rng.random_range(0..3)],
             detail: Detail::random(rng),
         }
     }

@@ -1,6 +1,6 @@
 //! The picture of both sides: `[z, y]`.
 
-use super::{Livery, MARGIN, darker, steps};
+use super::{Livery, MARGIN, darker, doors::Doors, steps};
 use crate::data::procedural::{
     canvas::{Canvas, Color, Place, rectangle, superellipse},
     parameters::BodyStyle,
@@ -10,13 +10,6 @@ use crate::data::procedural::{
 /// Height of the frame above the side windows, in metres.
 const ROOF_FRAME: f32 = 0.09;
 const GAP_WIDTH: f32 = 0.018;
-
-/// Where the doors are, z.
-struct Doors {
-    start: f32,
-    /// Ends of the front door and of the rear door, if there is one.
-    ends: Vec<f32>,
-}
 
 impl Livery {
     pub(super) fn side(&self, profile: &Profile) -> Canvas {
@@ -43,17 +36,27 @@ impl Livery {
         if self.roof != self.paint {
             canvas.fill(&outline, self.roof);
         }
+        if profile.in_box(profile.rear) {
+            let wall = profile.roof_end - 0.03;
+            canvas.fill(&rectangle([wall, 0.0], [profile.rear + 1.0, 9.0]), self.cargo);
+            // Where the panels of the box are joined.
+            for z in steps(wall, profile.rear, 3) {
+                canvas.trace(&[[z, 0.0], [z, 9.0]], 0.03, darker(self.cargo, 0.7));
+            }
+        }
     }
 
     fn paint_decals(&self, canvas: &mut Canvas, profile: &Profile, doors: &Doors) {
         let length = profile.rear - profile.front;
         let [floor, belt] = [profile.parameters.size.clearance, profile.belt(0.0)];
+        // Lettering fills the sides of vans and trucks.
+        let windowless = profile.in_box(profile.rear)
+            || self.detail.panel_van && profile.parameters.style == BodyStyle::Van;
+        let top = if windowless { profile.top(0.0) } else { belt };
         for decal in &self.detail.decals {
-            let center = [
-                profile.front + decal.center[0] * length,
-                floor + decal.center[1] * (belt - floor),
-            ];
-            let half_size = [decal.half_size[0] * length, decal.half_size[1] * (belt - floor)];
+            let center =
+                [profile.front + decal.center[0] * length, floor + decal.center[1] * (top - floor)];
+            let half_size = [decal.half_size[0] * length, decal.half_size[1] * (top - floor)];
             canvas.fill(&superellipse(center, half_size, decal.exponent), decal.color);
         }
         if self.detail.door_band {
@@ -147,7 +150,7 @@ impl Livery {
         let start = profile.cowl;
         let end = match profile.parameters.style {
             BodyStyle::Van if self.detail.panel_van => doors.ends[0] - 0.02,
-            BodyStyle::Pickup => profile.roof_end - 0.06,
+            BodyStyle::Pickup | BodyStyle::BoxTruck => profile.roof_end - 0.06,
             _ => {
                 let rear_pillar = 0.5 * (profile.deck_start - profile.roof_end).min(0.7);
                 (profile.roof_end + rear_pillar).min(profile.rear - 0.30)
@@ -181,23 +184,5 @@ impl Livery {
         canvas.fill(&rectangle([inner, low], [profile.rear + 0.2, high]), self.tail_lamp);
         let marker = [profile.axles[0] + profile.arch_radius + 0.07, 0.72 * profile.bonnet_height];
         canvas.fill(&superellipse(marker, [0.04, 0.018], 4.0), [0.9, 0.5, 0.1]);
-    }
-}
-
-impl Doors {
-    fn of(profile: &Profile) -> Self {
-        let start = profile.axles[0] + profile.arch_radius + 0.07;
-        let two_doors = match profile.parameters.style {
-            BodyStyle::Coupe => true,
-            BodyStyle::Pickup => profile.roof_end - start < 1.4,
-            _ => false,
-        };
-        let cabin_end = profile.axles[1] + 0.1;
-        let ends = match profile.parameters.style {
-            _ if two_doors => vec![(start + 1.25).min(cabin_end - 0.5)],
-            BodyStyle::Pickup => vec![0.5 * (start + profile.roof_end) + 0.1, profile.roof_end],
-            _ => vec![start + 0.54 * (cabin_end - start), cabin_end],
-        };
-        Self { start, ends }
     }
 }

@@ -20,7 +20,12 @@ impl Livery {
         self.paint_upper_body(&mut canvas, profile);
         self.paint_bonnet(&mut canvas, profile);
         self.paint_deck(&mut canvas, profile);
-        for window in [windscreen(profile), rear_window(profile)] {
+        if profile.in_box(profile.rear) {
+            let wall = profile.roof_end - 0.05;
+            canvas.fill(&rectangle([wall, -2.0], [profile.rear + 1.0, 2.0]), self.cargo);
+        }
+        let rear_window = Some(rear_window(profile)).filter(|_| self.has_rear_window(profile));
+        for window in [windscreen(profile)].into_iter().chain(rear_window) {
             let outline: Vec<Place> = window.iter().map(|&[z, x, _]| [z, x]).collect();
             canvas.outline(&outline, 0.05, [0.05; 3]);
             canvas.fill(&outline, self.glass);
@@ -49,7 +54,7 @@ impl Livery {
             let end = (front + 0.75).min(rear);
             canvas.fill(&rectangle([front, -0.4], [end, 0.4]), darker(self.glass, 1.2));
         }
-        if profile.parameters.style == BodyStyle::Van {
+        if matches!(profile.parameters.style, BodyStyle::Van | BodyStyle::Bus) {
             for z in steps(front + 0.2, rear, 6) {
                 canvas.trace(&[[z, -0.55], [z, 0.55]], 0.03, darker(self.roof, 0.8));
             }
@@ -78,7 +83,7 @@ impl Livery {
     /// The shut lines of the boot lid, or the floor of the bed.
     fn paint_deck(&self, canvas: &mut Canvas, profile: &Profile) {
         let [start, end] = [profile.deck_start + 0.06, profile.rear - 0.06];
-        if profile.bed().is_some() || end - start < 0.15 {
+        if !profile.parameters.style.has_deck() || profile.bed().is_some() || end - start < 0.15 {
             return;
         }
         let width = profile.shoulder(start) - 0.12;

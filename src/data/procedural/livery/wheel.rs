@@ -6,8 +6,8 @@ use super::Livery;
 use crate::data::procedural::{
     TYRE,
     canvas::{Canvas, Place, superellipse},
-    fittings::RIM_FRACTION,
     profile::Profile,
+    wheels::RIM_FRACTION,
 };
 
 impl Livery {
