@@ -13,9 +13,11 @@ mod resume;
 mod sampled_chamfer;
 mod shape_stage;
 mod shapes;
+mod shards;
 mod stage;
 
 pub use config::{DataConfig, PriorStageConfig, RegressorStageConfig, Schedule, TrainingConfig};
+pub use shards::write_shard;
 
 use std::{fs, path::Path, sync::Mutex};
 
