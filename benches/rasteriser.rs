@@ -16,6 +16,10 @@ const N_TRIANGLES: usize = 20_000;
 /// Views of a batch.
 const N_VIEWS: u64 = 32;
 
+/// As the binaries have it.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn main() {
     divan::main();
 }

@@ -3,7 +3,7 @@
 //! A photometric loss compares one surface point across frames, so a texture must not alias: each
 //! lookup averages over the texels that one pixel covers, from a pyramid of halved images.
 
-use image::RgbImage;
+use image::{Rgb, RgbImage};
 use nalgebra::{Matrix2, Vector2};
 
 /// A repeating texture with its halved copies, the finest first and the coarsest 1 × 1.
@@ -12,23 +12,25 @@ pub struct Texture {
     levels: Vec<Level>,
 }
 
-/// RGB row by row; the fourth channel is zero, and only fills a register.
+/// A picture whose border goes once around: before the first column stands the last one again, and
+/// so on. Any texel then has its neighbours beside it.
 #[derive(Clone, Debug)]
 struct Level {
-    /// `[width, height]`, in texels.
+    /// `[width, height]` without the border, in texels.
     size: [u32; 2],
+    /// RGB row by row; the fourth channel is zero, and only fills a register.
     texels: Vec<[u8; 4]>,
 }
 
 impl Texture {
     /// An empty image becomes plain white.
     pub fn new(image: &RgbImage) -> Self {
-        let (width, height) = image.dimensions();
-        let finest = if width == 0 || height == 0 {
-            Level { size: [1, 1], texels: vec![[255, 255, 255, 0]] }
-        } else {
-            let texels = image.pixels().map(|pixel| [pixel[0], pixel[1], pixel[2], 0]).collect();
-            Level { size: [width, height], texels }
+        let finest = match image.dimensions() {
+            (0, _) | (_, 0) => Level::new([1, 1], |_, _| [255, 255, 255, 0]),
+            (width, height) => Level::new([width, height], |x, y| {
+                let Rgb([red, green, blue]) = *image.get_pixel(x, y);
+                [red, green, blue, 0]
+            }),
         };
         let halvings = finest.size[0].max(finest.size[1]).next_power_of_two().ilog2();
         let mut levels = vec![finest];
@@ -52,8 +54,10 @@ impl Texture {
         // log₂ of a length is half that of its square. A NaN, from a degenerate uv map, becomes 0.
         let level = (squared(0).max(squared(1)).max(1.0).log2() / 2.0).min(coarsest);
 
-        let fine = level as usize;
-        let blend = level - fine as f32;
+        // A cast to few bits is the quickest.
+        let fine = level as u8;
+        let blend = level - f32::from(fine);
+        let fine = usize::from(fine);
         let place = [fraction(uv.x), fraction(1.0 - uv.y)];
         let mut color = self.levels[fine].bilinear(place);
         if blend > 0.0 {
@@ -65,35 +69,49 @@ impl Texture {
 }
 
 impl Level {
+    fn new([width, height]: [u32; 2], texel: impl Fn(u32, u32) -> [u8; 4]) -> Self {
+        let around = |side: u32| (0..side + 2).map(move |padded| (padded + side - 1) % side);
+        let texels = around(height).flat_map(|y| around(width).map(move |x| (x, y)));
+        Self { size: [width, height], texels: texels.map(|(x, y)| texel(x, y)).collect() }
+    }
+
     /// Box-filtered to half the size, rounded up; an odd last row or column counts twice.
     fn halved(&self) -> Self {
-        let [width, height] = self.size.map(|side| side.div_ceil(2));
         let [last_x, last_y] = self.size.map(|side| side - 1);
-        let texel = |x: u32, y: u32| {
+        Self::new(self.size.map(|side| side.div_ceil(2)), |x, y| {
             let [x0, y0] = [2 * x, 2 * y];
             let [x1, y1] = [(x0 + 1).min(last_x), (y0 + 1).min(last_y)];
-            let four = [[x0, y0], [x1, y0], [x0, y1], [x1, y1]].map(|[x, y]| self.texel(x, y));
+            let four = [[x0, y0], [x1, y0], [x0, y1], [x1, y1]].map(|texel| self.texel(texel));
             let sum = |c: usize| four.iter().map(|texel| u32::from(texel[c])).sum::<u32>();
             std::array::from_fn(|c| ((sum(c) + 2) / 4) as u8)
-        };
-        let rows = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        Self { size: [width, height], texels: rows.map(|(x, y)| texel(x, y)).collect() }
+        })
     }
 
-    /// Between the four nearest texel centres, wrapping around at the borders. In bytes' units.
+    /// Between the four nearest texel centres, in bytes' units, at `place` in [0, 1], to the right
+    /// and downwards. The border wraps around.
     ///
-    /// `place` is in [0, 1], to the right and downwards.
+    /// Were it inlined, the compiler would find the fourth channel unused, and the others no longer
+    /// a register.
+    #[inline(never)]
     fn bilinear(&self, place: [f32; 2]) -> [f32; 4] {
-        let ([left, right], across) = neighbours(place[0], self.size[0]);
-        let ([above, below], down) = neighbours(place[1], self.size[1]);
-        let texel = |x, y| self.texel(x, y).map(f32::from);
-        let top = mix(texel(left, above), texel(right, above), across);
-        let bottom = mix(texel(left, below), texel(right, below), across);
-        mix(top, bottom, down)
+        let [(column, across), (row, down)] = [0, 1].map(|axis| {
+            // With the border, texel 0 is centred on 1.5, and half a texel before it begins the
+            // last one's share. Coordinates that are not finite end up at the border.
+            let position = place[axis] * self.size[axis] as f32 + 0.5;
+            let first = u32::from(position as u16).min(self.size[axis]);
+            (first as usize, position - first as f32)
+        });
+        let stride = self.size[0] as usize + 2;
+        let above = row * stride + column;
+        let between = |first: usize| {
+            let [left, right] = [self.texels[first], self.texels[first + 1]];
+            mix(left.map(f32::from), right.map(f32::from), across)
+        };
+        mix(between(above), between(above + stride), down)
     }
 
-    fn texel(&self, x: u32, y: u32) -> [u8; 4] {
-        self.texels[(y * self.size[0] + x) as usize]
+    fn texel(&self, [x, y]: [u32; 2]) -> [u8; 4] {
+        self.texels[((y + 1) * (self.size[0] + 2) + x + 1) as usize]
     }
 }
 
@@ -104,16 +122,6 @@ fn fraction(coordinate: f32) -> f32 {
     if fraction < 0.0 { fraction + 1.0 } else { fraction }
 }
 
-/// The texels before and after `fraction` of an axis of `size` texels, and the second's weight.
-fn neighbours(fraction: f32, size: u32) -> ([u32; 2], f32) {
-    // From the last texel's centre, one repeat before, so that the position is positive.
-    let position = fraction * size as f32 + (size as f32 - 0.5);
-    let before = position as u32;
-    let wrapped = |texel: u32| if texel >= size { texel - size } else { texel };
-    let first = wrapped(before).min(size - 1);
-    ([first, wrapped(first + 1)], position - before as f32)
-}
-
 fn mix(from: [f32; 4], to: [f32; 4], share: f32) -> [f32; 4] {
     std::array::from_fn(|c| from[c] + share * (to[c] - from[c]))
 }
@@ -121,7 +129,6 @@ fn mix(from: [f32; 4], to: [f32; 4], share: f32) -> [f32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::Rgb;
 
     const POINT: Matrix2<f32> = Matrix2::new(0.0, 0.0, 0.0, 0.0);
 

@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Isometry3, Matrix2, Matrix2x3, Matrix3, Point3, RowVector3, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Vector2, Vector3};
 
 use super::z_buffer::{N, OFFSETS};
 use crate::camera::Intrinsics;
@@ -29,6 +29,12 @@ pub struct Vertex {
     samples_before: [u32; 2],
 }
 
+/// The pixels in which a triangle may be seen.
+pub struct Bounds {
+    pub columns: Range<usize>,
+    pub rows: Range<usize>,
+}
+
 impl Projector {
     pub fn new(
         camera_from_world: &Isometry3<f32>,
@@ -44,50 +50,52 @@ impl Projector {
         }
     }
 
+    #[inline]
     pub fn project(&self, point_in_world: &Point3<f32>) -> Vertex {
         let homogeneous = self.rotation * point_in_world.coords + self.translation;
         let scale = 2.0 / homogeneous.z;
         // Sample i lies at pixel (i + ½) / 2. Float-to-integer casts saturate.
-        let samples_before = |pixel: f32, side: usize| ((pixel + 0.5) as u32).min(2 * side as u32);
-        let [width, height] = self.size;
-        Vertex {
-            homogeneous,
-            samples_before: [
-                samples_before(homogeneous.x * scale, width),
-                samples_before(homogeneous.y * scale, height),
-            ],
-        }
+        let samples_before = |axis: usize| {
+            let index = homogeneous[axis] * scale + 0.5;
+            (index as u32).min(2 * self.size[axis] as u32)
+        };
+        let samples_before = [samples_before(0), samples_before(1)];
+        Vertex { homogeneous, samples_before }
     }
 
-    /// The columns and rows of pixels in which a triangle may cover samples, if any: those in the
-    /// box of its corners, or all if it reaches behind the camera, where the box means nothing.
-    pub fn pixel_bounds(&self, corners: [&Vertex; 3]) -> Option<[Range<usize>; 2]> {
+    /// None if no sample lies in the box of a triangle's corners. One that reaches behind the
+    /// camera has no such box, and may be anywhere.
+    pub fn bounds(&self, corners: [&Vertex; 3]) -> Option<Bounds> {
         let in_front = |corner: &&Vertex| corner.homogeneous.z > NEAR;
         if !corners.iter().all(in_front) {
-            return corners.iter().any(in_front).then(|| self.size.map(|side| 0..side));
+            let [columns, rows] = self.size.map(|side| 0..side);
+            return corners.iter().any(in_front).then_some(Bounds { columns, rows });
         }
-        let [a, b, c] = corners.map(|corner| corner.samples_before);
+        let [a, b, c] = corners;
         let samples = |axis: usize| {
-            let (a, b, c) = (a[axis], b[axis], c[axis]);
+            let [a, b, c] = [a, b, c].map(|corner| corner.samples_before[axis]);
             a.min(b).min(c)..a.max(b).max(c)
         };
         let [across, down] = [samples(0), samples(1)];
+        if across.is_empty() || down.is_empty() {
+            return None;
+        }
         let pixels =
             |samples: Range<u32>| samples.start as usize / 2..(samples.end as usize).div_ceil(2);
-        (!across.is_empty() && !down.is_empty()).then(|| [pixels(across), pixels(down)])
+        Some(Bounds { columns: pixels(across), rows: pixels(down) })
     }
 }
 
-/// A triangle's plane and edges, as functions of the pixel (x, y, 1).
+/// A triangle's edges and plane, as functions of the pixel (x, y, 1).
 pub struct Face {
     /// Which of the renderer's surfaces it is.
     pub surface_idx: u32,
-    /// λ_i / z up to one positive factor, so that neighbours agree exactly on their common edge.
+    /// The λ_i / z up to one positive factor, so that neighbours agree exactly on their common edge.
     weights: [Vector3<f32>; 3],
     inverse_depth: Vector3<f32>,
 }
 
-/// A face's weights and 1/z along a row of pixels, at x: `slopes[i] * x + starts[i][sample]`.
+/// Weights and 1/z along a row of pixels. At x, they are `slopes[i] * x + starts[i][sample]`.
 pub struct Row {
     pub slopes: [f32; 4],
     pub starts: [[f32; N]; 4],
@@ -111,32 +119,39 @@ impl Face {
     }
 
     /// The row of pixels whose upper side is at `y`.
-    pub fn row(&self, y: usize) -> Row {
-        let [a, b, c] = self.weights;
-        let functions = [a, b, c, self.inverse_depth];
-        let start = |f: Vector3<f32>| OFFSETS[1].map(|offset| f.y * (y as f32 + offset) + f.z);
-        Row { slopes: functions.map(|f| f.x), starts: functions.map(start) }
+    #[inline(always)]
+    pub fn row(&self, y: f32) -> Row {
+        let [a, b, c] = &self.weights;
+        let mut row = Row { slopes: [0.0; 4], starts: [[0.0; N]; 4] };
+        for (i, function) in [a, b, c, &self.inverse_depth].into_iter().enumerate() {
+            row.slopes[i] = function.x;
+            for k in 0..N {
+                row.starts[i][k] = function.y * (y + OFFSETS[1][k]) + function.z;
+            }
+        }
+        row
     }
 
     pub fn depth_at(&self, pixel: &Vector3<f32>) -> f32 {
         1.0 / self.inverse_depth.dot(pixel)
     }
 
-    /// Perspective-correct texture coordinates at a pixel (x, y, 1), from those of the corners in
-    /// columns, and their derivatives along the image's x and y.
+    /// Perspective-correct texture coordinates at a pixel (x, y, 1), from those of the corners, and
+    /// their derivatives along the image's x and y as columns.
     pub fn uv_at(
         &self,
         pixel: &Vector3<f32>,
-        corner_uvs: &Matrix2x3<f32>,
+        corner_uvs: &[[f32; 2]; 3],
     ) -> (Vector2<f32>, Matrix2<f32>) {
-        // (u, v) = Σ w uv / Σ w. Numerator and denominator are linear in the pixel.
-        let weights = Matrix3::from_rows(&self.weights.map(|weight| weight.transpose()));
-        let numerator = corner_uvs * weights;
-        let denominator: RowVector3<f32> = weights.row_sum();
-        let scale = 1.0 / (denominator * pixel).x;
-        let uv = numerator * pixel * scale;
-        // The quotient rule: (n / d)' = (n' − uv d') / d.
-        let slopes = numerator.fixed_columns::<2>(0) - uv * denominator.fixed_columns::<2>(0);
-        (uv, slopes * scale)
+        let [a, b, c] = &self.weights;
+        let weights = [a.dot(pixel), b.dot(pixel), c.dot(pixel)];
+        let scale = 1.0 / (weights[0] + weights[1] + weights[2]);
+        let [uv_a, uv_b, uv_c] = corner_uvs.map(Vector2::from);
+        let uv = (uv_a * weights[0] + uv_b * weights[1] + uv_c * weights[2]) * scale;
+        // uv Σ w = Σ w_i uv_i. Both sides by the product rule: uv' Σ w = Σ w_i' (uv_i − uv).
+        let [uv_a, uv_b, uv_c] = [uv_a - uv, uv_b - uv, uv_c - uv];
+        let along_x = (uv_a * a.x + uv_b * b.x + uv_c * c.x) * scale;
+        let along_y = (uv_a * a.y + uv_b * b.y + uv_c * c.y) * scale;
+        (uv, Matrix2::from_columns(&[along_x, along_y]))
     }
 }

@@ -1,5 +1,7 @@
 //! The rasteriser against a ray caster that shares nothing with it (Möller and Trumbore, 1997).
 
+mod blender;
+
 use std::path::Path;
 
 use image::{Luma, Rgb, RgbImage};
