@@ -23,6 +23,8 @@ pub enum Error {
     Points { path: PathBuf, reason: String },
     #[error("{}: not a valid config: {reason}", path.display())]
     Config { path: PathBuf, reason: String },
+    #[error("{}: not a usable shard: {reason}", path.display())]
+    Shard { path: PathBuf, reason: String },
     #[error("{}: not a usable prior: {reason}", path.display())]
     Prior { path: PathBuf, reason: String },
 }

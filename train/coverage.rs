@@ -10,10 +10,11 @@ use nalgebra::Point3;
 use object_pba::{
     Error, Result,
     data::{
+        collection::{Collection, Model},
         keyed_rng,
         mesh::Mesh,
         procedural,
-        shapenet::{CARS, find_models},
+        shapenet::CARS,
         surface::sample_surface,
     },
     metrics::style_error,
@@ -23,6 +24,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use self::contact_sheet::write_contact_sheet;
+use crate::selection::SelectionArguments;
 
 /// Cars on the contact sheet of the family.
 const N_SHOWN: usize = 48;
@@ -35,12 +37,11 @@ const PROCEDURAL: u64 = 2;
 /// What to compare, and where to.
 #[derive(Args)]
 pub struct CoverageArguments {
-    /// Folder of ShapeNetCore, v1 or v2.
-    #[arg(long)]
-    shapenet: PathBuf,
-    /// Category within it.
-    #[arg(long, default_value = CARS)]
-    synset: String,
+    /// Folder of meshes: ShapeNetCore v1 or v2, or any.
+    #[arg(long, alias = "shapenet")]
+    meshes: PathBuf,
+    #[command(flatten)]
+    selection: SelectionArguments,
     /// How many procedural cars to look among.
     #[arg(long, default_value_t = 2000, value_parser = clap::value_parser!(u64).range(1..))]
     models: u64,
@@ -108,8 +109,11 @@ pub fn coverage(arguments: &CoverageArguments) -> Result<()> {
 }
 
 fn real_cars(arguments: &CoverageArguments) -> Result<Vec<RealCar>> {
-    let models = find_models(&arguments.shapenet, &arguments.synset)?;
-    let load = |(idx, model): (usize, object_pba::data::shapenet::Model)| {
+    let root = &arguments.meshes;
+    let selection = arguments.selection.selection(&[CARS]);
+    let selection = selection.map_err(|reason| Error::Config { path: root.clone(), reason })?;
+    let models = Collection::open(root, &selection)?.models;
+    let load = |(idx, model): (usize, Model)| {
         let mesh = model.load()?.mesh;
         let [points, again] =
             [REAL, REAL_AGAIN].map(|stream| cloud(&mesh, arguments, [stream, idx as u64]));

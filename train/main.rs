@@ -12,11 +12,13 @@ use object_pba::{
 };
 use render::RenderArguments;
 use selection::SelectionArguments;
+use shards::{MergeArguments, ShardArguments};
 
 mod inspect;
 mod coverage;
 mod render;
 mod selection;
+mod shards;
 
 /// Large tensors come and go with every operation; the system's allocator returns each one's pages
 /// to the kernel and faults them in again, which doubles a training step.
@@ -37,28 +39,38 @@ enum Command {
     /// Summarise a collection of meshes before hours are spent on it.
     Inspect(InspectArguments),
     /// Train the autoencoder of shapes.
-    Prior(Arguments),
+    Prior(TrainArguments),
     /// Train the style and pose regressors, on a finished prior.
-    Regressors(Arguments),
+    Regressors(TrainArguments),
     /// Train both.
-    All(Arguments),
+    All(TrainArguments),
     /// Render sequences with their ground truth.
     Render(RenderArguments),
     /// Measure how far real cars are from the procedural family.
     Coverage(CoverageArguments),
+    /// Render the pictures that the regressors train on, as WebDataset tars.
+    Shards(ShardArguments),
+    /// Merge all shards of such pictures into one.
+    Merge(MergeArguments),
 }
 
 /// Interrupt training whenever you like: the same command goes on from its last checkpoint.
+#[derive(Args)]
+struct TrainArguments {
+    #[command(flatten)]
+    arguments: Arguments,
+    #[arg(long, default_value_t)]
+    device: Backend,
+}
+
 #[derive(Args)]
 struct Arguments {
     /// What to train: a preset such as configs/car-small.toml.
     #[arg(long)]
     config: PathBuf,
-    /// Folder for the weights, the effective config and metrics.jsonl.
+    /// Folder for what is made, and the effective config.
     #[arg(long)]
     out: PathBuf,
-    #[arg(long, default_value_t)]
-    device: Backend,
     /// Replaces the config's seed.
     #[arg(long)]
     seed: Option<u64>,
@@ -80,6 +92,8 @@ fn main() -> ExitCode {
         Command::All(arguments) => train(&arguments, true, true),
         Command::Render(arguments) => render::render(&arguments),
         Command::Coverage(arguments) => coverage::coverage(&arguments),
+        Command::Shards(arguments) => shards::write(&arguments),
+        Command::Merge(arguments) => shards::merge(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -90,9 +104,10 @@ fn main() -> ExitCode {
     }
 }
 
-fn train(arguments: &Arguments, prior: bool, regressors: bool) -> Result<()> {
+fn train(arguments: &TrainArguments, prior: bool, regressors: bool) -> Result<()> {
+    let TrainArguments { arguments, device } = arguments;
     let config = arguments.config()?;
-    let device = arguments.device.device();
+    let device = device.device();
     if prior {
         train_shape_prior(&config, &arguments.out, &device)?;
     }

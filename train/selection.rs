@@ -4,7 +4,7 @@ use clap::Args;
 use object_pba::data::collection::{Axes, Selection, SignedAxis, Split};
 
 /// Which models of a folder to take, and how they are turned.
-#[derive(Args)]
+#[derive(Args, Default)]
 pub struct SelectionArguments {
     /// Category of ShapeNet; several with commas, or by repetition.
     #[arg(long, value_delimiter = ',')]

@@ -139,7 +139,7 @@ impl Ground {
         let woven = RgbImage::from_fn(SIDE, SIDE, |x, y| {
             Rgb(texels[(y * SIDE + x) as usize].map(|value| (value * 255.0) as u8))
         });
-        Self { height, texture: Texture::new(woven), repeat: rng.random_range(0.8..1.6) }
+        Self { height, texture: Texture::new(&woven), repeat: rng.random_range(0.8..1.6) }
     }
 }
 

@@ -4,91 +4,125 @@
 //! lookup averages over the texels that one pixel covers, from a pyramid of halved images.
 
 use image::{Rgb, RgbImage};
+use nalgebra::{Matrix2, Vector2};
 
 /// A repeating texture with its halved copies, the finest first and the coarsest 1 × 1.
 #[derive(Clone, Debug)]
 pub struct Texture {
-    levels: Vec<RgbImage>,
+    levels: Vec<Level>,
+}
+
+/// A picture whose border goes once around: before the first column stands the last one again, and
+/// so on. Any texel then has its neighbours beside it.
+#[derive(Clone, Debug)]
+struct Level {
+    /// `[width, height]` without the border, in texels.
+    size: [u32; 2],
+    /// RGB row by row; the fourth channel is zero, and only fills a register.
+    texels: Vec<[u8; 4]>,
 }
 
 impl Texture {
     /// An empty image becomes plain white.
-    pub fn new(image: RgbImage) -> Self {
-        let empty = image.width() == 0 || image.height() == 0;
-        let finest = if empty { RgbImage::from_pixel(1, 1, Rgb([255; 3])) } else { image };
-        let halvings = finest.width().max(finest.height()).next_power_of_two().ilog2();
+    pub fn new(image: &RgbImage) -> Self {
+        let finest = match image.dimensions() {
+            (0, _) | (_, 0) => Level::new([1, 1], |_, _| [255, 255, 255, 0]),
+            (width, height) => Level::new([width, height], |x, y| {
+                let Rgb([red, green, blue]) = *image.get_pixel(x, y);
+                [red, green, blue, 0]
+            }),
+        };
+        let halvings = finest.size[0].max(finest.size[1]).next_power_of_two().ilog2();
         let mut levels = vec![finest];
         for level in 0..halvings as usize {
-            levels.push(halve(&levels[level]));
+            levels.push(levels[level].halved());
         }
         Self { levels }
     }
 
     /// RGB in [0, 1] at `uv`, v upwards, averaged over a pixel's footprint.
     ///
-    /// `uv_per_pixel` holds ∂uv/∂x and ∂uv/∂y of the image. The longer of the two decides: rather a
-    /// little too soft at a grazing angle than sparkling.
-    pub fn sample(&self, uv: [f32; 2], uv_per_pixel: [[f32; 2]; 2]) -> [f32; 3] {
-        let [width, height] = [self.levels[0].width() as f32, self.levels[0].height() as f32];
-        let [along_x, along_y] =
-            uv_per_pixel.map(|[u, v]| (u * width).powi(2) + (v * height).powi(2));
+    /// `uv_per_pixel` holds ∂uv/∂x and ∂uv/∂y of the image as columns. The longer of the two
+    /// decides: rather a little too soft at a grazing angle than sparkling.
+    pub fn sample(&self, uv: Vector2<f32>, uv_per_pixel: Matrix2<f32>) -> [f32; 3] {
+        let [width, height] = self.levels[0].size.map(|side| side as f32);
+        let squared = |axis| {
+            let along = uv_per_pixel.column(axis);
+            (along.x * width).powi(2) + (along.y * height).powi(2)
+        };
         let coarsest = (self.levels.len() - 1) as f32;
         // log₂ of a length is half that of its square. A NaN, from a degenerate uv map, becomes 0.
-        let level = (along_x.max(along_y).max(1.0).log2() / 2.0).min(coarsest);
+        let level = (squared(0).max(squared(1)).max(1.0).log2() / 2.0).min(coarsest);
 
-        let fine = level as usize;
-        let blend = level - fine as f32;
-        let color = bilinear(&self.levels[fine], uv);
-        if blend == 0.0 {
-            return color;
+        // A cast to few bits is the quickest.
+        let fine = level as u8;
+        let blend = level - f32::from(fine);
+        let fine = usize::from(fine);
+        let place = [fraction(uv.x), fraction(1.0 - uv.y)];
+        let mut color = self.levels[fine].bilinear(place);
+        if blend > 0.0 {
+            color = mix(color, self.levels[fine + 1].bilinear(place), blend);
         }
-        let coarse = bilinear(&self.levels[fine + 1], uv);
-        mix(color, coarse, blend)
+        let [red, green, blue, _] = color;
+        [red, green, blue].map(|value| value / 255.0)
     }
 }
 
-/// Box-filters to half the size, rounded up; an odd last row or column counts twice.
-fn halve(image: &RgbImage) -> RgbImage {
-    let [last_x, last_y] = [image.width() - 1, image.height() - 1];
-    RgbImage::from_fn(image.width().div_ceil(2), image.height().div_ceil(2), |x, y| {
-        let [x0, y0] = [2 * x, 2 * y];
-        let [x1, y1] = [(x0 + 1).min(last_x), (y0 + 1).min(last_y)];
-        let texels = [[x0, y0], [x1, y0], [x0, y1], [x1, y1]].map(|[x, y]| image.get_pixel(x, y).0);
-        let sum = |c: usize| texels.iter().map(|texel| u32::from(texel[c])).sum::<u32>();
-        Rgb(std::array::from_fn(|c| ((sum(c) + 2) / 4) as u8))
-    })
-}
-
-/// RGB in [0, 1] between the four nearest texel centres, wrapping around at the borders.
-fn bilinear(image: &RgbImage, [u, v]: [f32; 2]) -> [f32; 3] {
-    let ([left, right], across) = neighbours(u, image.width());
-    let ([above, below], down) = neighbours(1.0 - v, image.height());
-    let texel = |x: u32, y: u32| {
-        let first = 3 * (y as usize * image.width() as usize + x as usize);
-        [0, 1, 2].map(|c| f32::from(image.as_raw()[first + c]))
-    };
-    let top = mix(texel(left, above), texel(right, above), across);
-    let bottom = mix(texel(left, below), texel(right, below), across);
-    mix(top, bottom, down).map(|value| value / 255.0)
-}
-
-/// The texels before and after `coordinate` on an axis of `size` texels, and the second's weight.
-fn neighbours(coordinate: f32, size: u32) -> ([u32; 2], f32) {
-    // The fractional part first: it keeps its precision however often the texture has repeated.
-    // Casts instead of floor(): baseline x86-64 has no instruction for it.
-    let mut fraction = coordinate - coordinate as i32 as f32;
-    if fraction < 0.0 {
-        fraction += 1.0;
+impl Level {
+    fn new([width, height]: [u32; 2], texel: impl Fn(u32, u32) -> [u8; 4]) -> Self {
+        let around = |side: u32| (0..side + 2).map(move |padded| (padded + side - 1) % side);
+        let texels = around(height).flat_map(|y| around(width).map(move |x| (x, y)));
+        Self { size: [width, height], texels: texels.map(|(x, y)| texel(x, y)).collect() }
     }
-    // From the last texel's centre, one repeat before, so that the position is positive.
-    let position = fraction * size as f32 + (size as f32 - 0.5);
-    let before = position as u32;
-    let wrapped = |texel: u32| if texel >= size { texel - size } else { texel };
-    let first = wrapped(before).min(size - 1);
-    ([first, wrapped(first + 1)], position - before as f32)
+
+    /// Box-filtered to half the size, rounded up; an odd last row or column counts twice.
+    fn halved(&self) -> Self {
+        let [last_x, last_y] = self.size.map(|side| side - 1);
+        Self::new(self.size.map(|side| side.div_ceil(2)), |x, y| {
+            let [x0, y0] = [2 * x, 2 * y];
+            let [x1, y1] = [(x0 + 1).min(last_x), (y0 + 1).min(last_y)];
+            let four = [[x0, y0], [x1, y0], [x0, y1], [x1, y1]].map(|texel| self.texel(texel));
+            let sum = |c: usize| four.iter().map(|texel| u32::from(texel[c])).sum::<u32>();
+            std::array::from_fn(|c| ((sum(c) + 2) / 4) as u8)
+        })
+    }
+
+    /// Between the four nearest texel centres, in bytes' units, at `place` in [0, 1], to the right
+    /// and downwards. The border wraps around.
+    ///
+    /// Were it inlined, the compiler would find the fourth channel unused, and the others no longer
+    /// a register.
+    #[inline(never)]
+    fn bilinear(&self, place: [f32; 2]) -> [f32; 4] {
+        let [(column, across), (row, down)] = [0, 1].map(|axis| {
+            // With the border, texel 0 is centred on 1.5, and half a texel before it begins the
+            // last one's share. Coordinates that are not finite end up at the border.
+            let position = place[axis] * self.size[axis] as f32 + 0.5;
+            let first = u32::from(position as u16).min(self.size[axis]);
+            (first as usize, position - first as f32)
+        });
+        let stride = self.size[0] as usize + 2;
+        let above = row * stride + column;
+        let between = |first: usize| {
+            let [left, right] = [self.texels[first], self.texels[first + 1]];
+            mix(left.map(f32::from), right.map(f32::from), across)
+        };
+        mix(between(above), between(above + stride), down)
+    }
+
+    fn texel(&self, [x, y]: [u32; 2]) -> [u8; 4] {
+        self.texels[((y + 1) * (self.size[0] + 2) + x + 1) as usize]
+    }
 }
 
-fn mix(from: [f32; 3], to: [f32; 3], share: f32) -> [f32; 3] {
+/// What is left of a coordinate without its whole repeats: it keeps its precision however many.
+fn fraction(coordinate: f32) -> f32 {
+    // A cast instead of floor(): baseline x86-64 has no instruction for it.
+    let fraction = coordinate - coordinate as i32 as f32;
+    if fraction < 0.0 { fraction + 1.0 } else { fraction }
+}
+
+fn mix(from: [f32; 4], to: [f32; 4], share: f32) -> [f32; 4] {
     std::array::from_fn(|c| from[c] + share * (to[c] - from[c]))
 }
 
@@ -96,17 +130,17 @@ fn mix(from: [f32; 3], to: [f32; 3], share: f32) -> [f32; 3] {
 mod tests {
     use super::*;
 
-    const POINT: [[f32; 2]; 2] = [[0.0; 2]; 2];
+    const POINT: Matrix2<f32> = Matrix2::new(0.0, 0.0, 0.0, 0.0);
 
     fn checkerboard() -> Texture {
-        Texture::new(RgbImage::from_fn(8, 8, |x, y| Rgb([((x + y) % 2 * 255) as u8; 3])))
+        Texture::new(&RgbImage::from_fn(8, 8, |x, y| Rgb([((x + y) % 2 * 255) as u8; 3])))
     }
 
     #[test]
     fn texel_centres_return_their_texel_with_v_upwards() {
         let mut image = RgbImage::new(4, 2);
         image.put_pixel(3, 0, Rgb([255, 0, 51]));
-        let color = Texture::new(image).sample([3.5 / 4.0, 0.75], POINT);
+        let color = Texture::new(&image).sample(Vector2::new(3.5 / 4.0, 0.75), POINT);
         assert_eq!(color, [1.0, 0.0, 0.2]);
     }
 
@@ -114,8 +148,8 @@ mod tests {
     fn textures_repeat() {
         let texture = checkerboard();
         for uv in [[0.1, 0.2], [0.97, 0.01], [0.5, 0.999]] {
-            let there = texture.sample([uv[0] + 3.0, uv[1] - 2.0], POINT);
-            for (a, b) in texture.sample(uv, POINT).into_iter().zip(there) {
+            let there = texture.sample(Vector2::new(uv[0] + 3.0, uv[1] - 2.0), POINT);
+            for (a, b) in texture.sample(uv.into(), POINT).into_iter().zip(there) {
                 assert!((a - b).abs() < 1e-4, "{a} and {b} at {uv:?}");
             }
         }
@@ -123,15 +157,18 @@ mod tests {
 
     #[test]
     fn a_checkerboard_seen_from_afar_is_grey() {
-        let color = checkerboard().sample([0.3, 0.8], [[0.25, 0.0], [0.0, 0.25]]);
+        let color = checkerboard().sample(Vector2::new(0.3, 0.8), Matrix2::identity() / 4.0);
         assert!(color.iter().all(|value| (value - 0.5).abs() < 0.01), "{color:?}");
     }
 
     #[test]
     fn odd_and_empty_images_are_textures_too() {
-        let odd = Texture::new(RgbImage::from_pixel(5, 3, Rgb([51; 3])));
-        assert_eq!(odd.levels.last().map(|level| level.dimensions()), Some((1, 1)));
-        assert_eq!(odd.sample([0.9, 0.9], [[10.0; 2]; 2]), [0.2; 3]);
-        assert_eq!(Texture::new(RgbImage::new(0, 4)).sample([0.5; 2], POINT), [1.0; 3]);
+        let odd = Texture::new(&RgbImage::from_pixel(5, 3, Rgb([51; 3])));
+        assert_eq!(odd.levels.last().map(|level| level.size), Some([1, 1]));
+        assert_eq!(odd.sample(Vector2::repeat(0.9), Matrix2::repeat(10.0)), [0.2; 3]);
+        assert_eq!(
+            Texture::new(&RgbImage::new(0, 4)).sample(Vector2::repeat(0.5), POINT),
+            [1.0; 3]
+        );
     }
 }

@@ -31,9 +31,14 @@ pub(super) struct Crop {
     pub focal_ratio: f32,
     /// Which of the shapes that were asked for.
     pub shape_idx: usize,
+    /// Which view of that shape.
+    pub view: usize,
 }
 
 /// Renders `n_views` of each shape, spread over its paints.
+///
+/// A crop follows from (seed, model, view) alone: neither the number of threads nor which other
+/// models are asked for changes it.
 pub(super) fn render_crops(
     config: &TrainingConfig,
     shapes: &Shapes,
@@ -52,13 +57,8 @@ pub(super) fn render_crops(
                 let renderer = Renderer::new(&mesh);
                 for view in (paint..n_views).step_by(paints) {
                     let mut rng = keyed_rng(config.seed, [VIEW + view as u64, model_idx as u64]);
-                    crops.extend(render_crop(
-                        config,
-                        &mesh.vertices,
-                        &renderer,
-                        shape_idx,
-                        &mut rng,
-                    ));
+                    let crop = render_crop(config, &mesh.vertices, &renderer, &mut rng);
+                    crops.push(Crop { shape_idx, view, ..crop });
                 }
             }
             progress();
@@ -95,17 +95,19 @@ impl Crop {
     }
 }
 
-/// One crop; `None` where the object came to lie behind the camera, which viewpoints exclude.
+/// A crop whose shape and view are still to be told.
 fn render_crop(
     config: &TrainingConfig,
     vertices: &[Point3<f32>],
     renderer: &Renderer,
-    shape_idx: usize,
     rng: &mut impl Rng,
-) -> Option<Crop> {
+) -> Crop {
     let network = &config.regressors.network;
     let view = Viewpoint::random(vertices, [PICTURE; 2], &config.data.viewpoints, rng);
-    let object = projected_box(vertices, &view.camera_from_world, &view.intrinsics)?;
+    // Viewpoints have the object in view. Should one not, the crop is the picture.
+    let whole = [0.0, 0.0, PICTURE as f32, PICTURE as f32];
+    let object = projected_box(vertices, &view.camera_from_world, &view.intrinsics);
+    let object = object.unwrap_or(whole);
     let object = jitter(object, config.regressors.box_jitter, rng);
     let size = network.crop_size;
     let camera = CropCamera::around(object, &view.intrinsics, size, network.crop_margin);
@@ -114,12 +116,13 @@ fn render_crop(
     let scene = Scene::random(rng, None);
     let picture = renderer.render(&scene, &crop_from_world, &camera.intrinsics, [size; 2]);
     let values = crop_values(&picture.color, &picture.coverage);
-    Some(Crop {
+    Crop {
         pixels: values.into_iter().map(|value| (value * 255.0).round() as u8).collect(),
         crop_from_world,
         focal_ratio: camera.intrinsics.focal[0] / size as f32,
-        shape_idx,
-    })
+        shape_idx: 0,
+        view: 0,
+    }
 }
 
 /// F R F and F t, where F flips x: the pose at which the mirrored shape looks mirrored.
@@ -142,6 +145,37 @@ mod tests {
     use super::*;
     use crate::camera::Intrinsics;
     use crate::data::viewpoint::{orbit_rotation, project};
+    use rayon::ThreadPoolBuilder;
+
+    /// Crops of these procedural cars, rendered on so many threads.
+    fn crops_of(models: &[usize], n_threads: usize) -> Vec<Crop> {
+        let mut config = TrainingConfig::default();
+        config.data.paints_per_model = 2;
+        config.regressors.network.crop_size = 32;
+        let shapes = Shapes::open(&config.data, config.seed).expect("cars need no files");
+        let pool = ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads start");
+        pool.install(|| render_crops(&config, &shapes, models, 3, || ()))
+            .expect("cars need no files")
+    }
+
+    #[track_caller]
+    fn check_same(crops: &[Crop], others: &[Crop]) {
+        let data = |crop: &Crop| (crop.view, crop.crop_from_world, crop.pixels.clone());
+        assert_eq!(crops.len(), others.len());
+        assert!(crops.iter().zip(others).all(|(crop, other)| data(crop) == data(other)));
+    }
+
+    #[test]
+    fn any_number_of_workers_makes_the_same_crops() {
+        let crops = crops_of(&[0, 1, 2, 3], 1);
+        assert_eq!(crops.len(), 12);
+        check_same(&crops, &crops_of(&[0, 1, 2, 3], 2));
+    }
+
+    #[test]
+    fn a_model_has_its_own_crops_whichever_others_are_asked_for() {
+        check_same(&crops_of(&[1, 2], 1)[3..], &crops_of(&[2], 1));
+    }
 
     #[test]
     fn a_mirrored_pose_shows_the_mirrored_point_in_the_mirrored_column() {

@@ -14,10 +14,12 @@ mod resume;
 mod sampled_chamfer;
 mod shape_stage;
 mod shapes;
+mod shards;
 mod stage;
 
 pub use config::{PriorStageConfig, RegressorStageConfig, Schedule, TrainingConfig};
 pub use data_config::DataConfig;
+pub use shards::write_shard;
 
 use std::{fs, path::Path, sync::Mutex};
 

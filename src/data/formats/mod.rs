@@ -3,6 +3,7 @@
 pub mod axes;
 pub mod nerfstudio;
 pub mod ply;
+pub mod webdataset;
 
 use std::{fs, path::Path, process};
 

@@ -6,130 +6,152 @@
 
 use std::ops::Range;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, Vector2, Vector3};
 
-use super::SAMPLES;
-use crate::{camera::Intrinsics, data::mesh::Triangle};
+use super::z_buffer::{N, OFFSETS};
+use crate::camera::Intrinsics;
 
 /// Nearest depth that is drawn, in world units.
-const NEAR: f32 = 1e-3;
+pub const NEAR: f32 = 1e-3;
+
+/// p ↦ K (R p + t), and the pixels around where that lies.
+pub struct Projector {
+    rotation: Matrix3<f32>,
+    translation: Vector3<f32>,
+    size: [usize; 2],
+}
 
 /// A vertex as one camera sees it.
 pub struct Vertex {
     /// K p = z (x, y, 1), where (x, y) is its pixel.
     homogeneous: Vector3<f32>,
-    pixel: [f32; 2],
+    /// How many columns and rows of samples lie before it. Only means something before the camera.
+    samples_before: [u32; 2],
 }
 
-impl Vertex {
+/// The pixels in which a triangle may be seen.
+pub struct Bounds {
+    pub columns: Range<usize>,
+    pub rows: Range<usize>,
+}
+
+impl Projector {
     pub fn new(
-        point_in_world: &Point3<f32>,
         camera_from_world: &Isometry3<f32>,
         Intrinsics { focal, center }: &Intrinsics,
+        size: [usize; 2],
     ) -> Self {
-        let point = camera_from_world * point_in_world;
-        let homogeneous = Vector3::new(
-            point.x * focal[0] + point.z * center[0],
-            point.y * focal[1] + point.z * center[1],
-            point.z,
-        );
-        Self { homogeneous, pixel: [homogeneous.x / point.z, homogeneous.y / point.z] }
+        let pixel_from_camera =
+            Matrix3::new(focal[0], 0.0, center[0], 0.0, focal[1], center[1], 0.0, 0.0, 1.0);
+        Self {
+            rotation: pixel_from_camera * camera_from_world.rotation.to_rotation_matrix().matrix(),
+            translation: pixel_from_camera * camera_from_world.translation.vector,
+            size,
+        }
+    }
+
+    #[inline]
+    pub fn project(&self, point_in_world: &Point3<f32>) -> Vertex {
+        let homogeneous = self.rotation * point_in_world.coords + self.translation;
+        let scale = 2.0 / homogeneous.z;
+        // Sample i lies at pixel (i + ½) / 2. Float-to-integer casts saturate.
+        let samples_before = |axis: usize| {
+            let index = homogeneous[axis] * scale + 0.5;
+            (index as u32).min(2 * self.size[axis] as u32)
+        };
+        let samples_before = [samples_before(0), samples_before(1)];
+        Vertex { homogeneous, samples_before }
+    }
+
+    /// None if no sample lies in the box of a triangle's corners. One that reaches behind the
+    /// camera has no such box, and may be anywhere.
+    pub fn bounds(&self, corners: [&Vertex; 3]) -> Option<Bounds> {
+        let in_front = |corner: &&Vertex| corner.homogeneous.z > NEAR;
+        if !corners.iter().all(in_front) {
+            let [columns, rows] = self.size.map(|side| 0..side);
+            return corners.iter().any(in_front).then_some(Bounds { columns, rows });
+        }
+        let [a, b, c] = corners;
+        let samples = |axis: usize| {
+            let [a, b, c] = [a, b, c].map(|corner| corner.samples_before[axis]);
+            a.min(b).min(c)..a.max(b).max(c)
+        };
+        let [across, down] = [samples(0), samples(1)];
+        if across.is_empty() || down.is_empty() {
+            return None;
+        }
+        let pixels =
+            |samples: Range<u32>| samples.start as usize / 2..(samples.end as usize).div_ceil(2);
+        Some(Bounds { columns: pixels(across), rows: pixels(down) })
     }
 }
 
-pub struct Face<'a> {
-    pub triangle: &'a Triangle,
-    /// λ_i / z up to one positive factor, so that neighbours agree exactly on their common edge.
-    weights: [Linear; 3],
-    inverse_depth: Linear,
+/// A triangle's edges and plane, as functions of the pixel (x, y, 1).
+pub struct Face {
+    /// Which of the renderer's surfaces it is.
+    pub surface_idx: u32,
+    /// The λ_i / z up to one positive factor, so that neighbours agree exactly on their common edge.
+    weights: [Vector3<f32>; 3],
+    inverse_depth: Vector3<f32>,
 }
 
-impl<'a> Face<'a> {
-    /// With the columns and rows of samples that it may cover. None if there are none, if the face
-    /// is seen edge-on, or if its vertices do not exist.
-    pub fn new(
-        triangle: &'a Triangle,
-        vertices: &[Vertex],
-        n_samples: [u32; 2],
-    ) -> Option<(Self, [Range<u32>; 2])> {
-        let [a, b, c] = triangle.vertices.map(|idx| vertices.get(idx as usize));
-        let corners = [a?, b?, c?];
-        let bounds = sample_bounds(corners, n_samples)?;
+/// Weights and 1/z along a row of pixels. At x, they are `slopes[i] * x + starts[i][sample]`.
+pub struct Row {
+    pub slopes: [f32; 4],
+    pub starts: [[f32; N]; 4],
+}
 
+impl Face {
+    /// None if the face is seen edge-on, or is not finite.
+    pub fn new(corners: [&Vertex; 3], surface_idx: u32) -> Option<Self> {
         let [a, b, c] = corners.map(|corner| corner.homogeneous);
         let plane = (b - a).cross(&(c - a));
         let determinant = plane.dot(&a);
         if determinant == 0.0 || !determinant.is_finite() {
             return None;
         }
-        let edges = [b.cross(&c), c.cross(&a), a.cross(&b)];
-        let face = Self {
-            triangle,
-            weights: edges.map(|edge| Linear(edge * determinant.signum())),
-            inverse_depth: Linear(plane * determinant.recip()),
-        };
-        Some((face, bounds))
+        let sign = determinant.signum();
+        Some(Self {
+            surface_idx,
+            weights: [b.cross(&c) * sign, c.cross(&a) * sign, a.cross(&b) * sign],
+            inverse_depth: plane * determinant.recip(),
+        })
     }
 
-    /// 1/z where the pixel's ray meets the face in front of the camera.
-    pub fn inverse_depth_at(&self, pixel: [f32; 2]) -> Option<f32> {
-        let [a, b, c] = self.weights.map(|weight| weight.at(pixel));
-        let inverse_depth = self.inverse_depth.at(pixel);
-        // Without branches: they would be taken at random along every edge.
-        let inside = (a >= 0.0) & (b >= 0.0) & (c >= 0.0);
-        (inside & (inverse_depth > 0.0) & (inverse_depth < 1.0 / NEAR)).then_some(inverse_depth)
+    /// The row of pixels whose upper side is at `y`.
+    #[inline(always)]
+    pub fn row(&self, y: f32) -> Row {
+        let [a, b, c] = &self.weights;
+        let mut row = Row { slopes: [0.0; 4], starts: [[0.0; N]; 4] };
+        for (i, function) in [a, b, c, &self.inverse_depth].into_iter().enumerate() {
+            row.slopes[i] = function.x;
+            for k in 0..N {
+                row.starts[i][k] = function.y * (y + OFFSETS[1][k]) + function.z;
+            }
+        }
+        row
     }
 
-    pub fn depth_at(&self, pixel: [f32; 2]) -> f32 {
-        1.0 / self.inverse_depth.at(pixel)
+    pub fn depth_at(&self, pixel: &Vector3<f32>) -> f32 {
+        1.0 / self.inverse_depth.dot(pixel)
     }
 
-    /// Perspective-correct texture coordinates, and their derivatives along the image's x and y.
-    pub fn uv_at(&self, pixel: [f32; 2]) -> ([f32; 2], [[f32; 2]; 2]) {
-        let uvs = self.triangle.uvs;
-        let weighted =
-            |factors: [f32; 3]| [0, 1].map(|k| (0..3).map(|i| factors[i] * uvs[i][k]).sum::<f32>());
-        let weights = self.weights.map(|weight| weight.at(pixel));
-        let scale = 1.0 / weights.iter().sum::<f32>();
-        let uv = weighted(weights).map(|sum| sum * scale);
-
-        // The quotient rule: (Σ w u / Σ w)' = (Σ w' u − uv Σ w') / Σ w.
-        let uv_per_pixel = [0, 1].map(|axis| {
-            let slopes = self.weights.map(|Linear(coefficients)| coefficients[axis]);
-            let [sum, total] = [weighted(slopes), [slopes.iter().sum(); 2]];
-            [0, 1].map(|k| (sum[k] - uv[k] * total[k]) * scale)
-        });
-        (uv, uv_per_pixel)
-    }
-}
-
-/// A function of the pixel: these coefficients times (x, y, 1).
-#[derive(Clone, Copy)]
-struct Linear(Vector3<f32>);
-
-impl Linear {
-    fn at(self, [x, y]: [f32; 2]) -> f32 {
-        self.0.x * x + (self.0.y * y + self.0.z)
-    }
-}
-
-/// The samples within the projected bounding box; all of them if the triangle reaches behind the
-/// camera, where its projection has no bounds.
-fn sample_bounds(corners: [&Vertex; 3], n_samples: [u32; 2]) -> Option<[Range<u32>; 2]> {
-    let depths = corners.map(|corner| corner.homogeneous.z);
-    if depths.iter().all(|depth| *depth > NEAR) {
-        let [a, b, c] = corners.map(|corner| corner.pixel);
-        let bounds = [0, 1].map(|axis| {
-            // Sample i lies at pixel (i + ½) / SAMPLES. Float-to-integer casts saturate.
-            let index = |pixel: f32| (pixel * SAMPLES as f32 + 0.5) as u32;
-            let first = index(a[axis].min(b[axis]).min(c[axis]));
-            let end = index(a[axis].max(b[axis]).max(c[axis]));
-            first..end.min(n_samples[axis])
-        });
-        bounds.iter().all(|range| !range.is_empty()).then_some(bounds)
-    } else if depths.iter().any(|depth| *depth > NEAR) {
-        Some(n_samples.map(|n| 0..n))
-    } else {
-        None
+    /// Perspective-correct texture coordinates at a pixel (x, y, 1), from those of the corners, and
+    /// their derivatives along the image's x and y as columns.
+    pub fn uv_at(
+        &self,
+        pixel: &Vector3<f32>,
+        corner_uvs: &[[f32; 2]; 3],
+    ) -> (Vector2<f32>, Matrix2<f32>) {
+        let [a, b, c] = &self.weights;
+        let weights = [a.dot(pixel), b.dot(pixel), c.dot(pixel)];
+        let scale = 1.0 / (weights[0] + weights[1] + weights[2]);
+        let [uv_a, uv_b, uv_c] = corner_uvs.map(Vector2::from);
+        let uv = (uv_a * weights[0] + uv_b * weights[1] + uv_c * weights[2]) * scale;
+        // uv Σ w = Σ w_i uv_i. Both sides by the product rule: uv' Σ w = Σ w_i' (uv_i − uv).
+        let [uv_a, uv_b, uv_c] = [uv_a - uv, uv_b - uv, uv_c - uv];
+        let along_x = (uv_a * a.x + uv_b * b.x + uv_c * c.x) * scale;
+        let along_y = (uv_a * a.y + uv_b * b.y + uv_c * c.y) * scale;
+        (uv, Matrix2::from_columns(&[along_x, along_y]))
     }
 }

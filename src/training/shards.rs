@@ -1,0 +1,190 @@
+//! The regressors' training pictures as files: the very crops that training renders.
+
+use std::{fs, path::Path};
+
+use image::{GrayImage, RgbImage};
+use indicatif::ProgressBar;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::{
+    DataConfig, TrainingConfig,
+    crops::{Crop, render_crops},
+    shapes::Shapes,
+};
+use crate::{
+    Error, Result,
+    config::write_config,
+    data::formats::{
+        axes::{TransformMatrix, transform_matrix},
+        webdataset::{Contents, Part, Sample, ShardWriter, is_finished},
+    },
+};
+
+/// Models that are rendered at a time: enough for many threads, little enough for memory.
+const CHUNK: usize = 32;
+
+/// Renders a part of the training crops into the folder `out`, as a WebDataset tar.
+///
+/// Sample `model · views_per_model + view` is that view of that model. A finished part is left alone.
+pub fn write_shard(config: &TrainingConfig, part: Part, out: &Path) -> Result<Contents> {
+    let shapes = Shapes::open(&config.data, config.seed)?;
+    let models = shapes.training();
+    let n_views = config.data.views_per_model;
+    let range = part.range(models.len());
+    let contents = Contents {
+        dataset: fingerprint(config, models.len()),
+        samples: range.start * n_views..range.end * n_views,
+        total: models.len() * n_views,
+    };
+    let path = out.join(part.file_name("crops", "tar"));
+    if is_finished(&path, &contents)? {
+        return Ok(contents);
+    }
+    fs::create_dir_all(out).map_err(Error::io(out))?;
+    write_config(&out.join("config.toml"), config)?;
+
+    let bar = ProgressBar::new(range.len() as u64).with_message("rendering");
+    let mut writer = ShardWriter::create(&path, contents.clone())?;
+    for models in models[range].chunks(CHUNK) {
+        let mut crops = render_crops(config, &shapes, models, n_views, || bar.inc(1))?;
+        crops.sort_by_key(|crop| (crop.shape_idx, crop.view));
+        for crop in &crops {
+            writer.append(&sample(config, crop, models[crop.shape_idx]))?;
+        }
+    }
+    writer.finish()?;
+    bar.finish_and_clear();
+    Ok(contents)
+}
+
+/// Names all that the crops follow from. Where a machine keeps its meshes is not part of it.
+fn fingerprint(config: &TrainingConfig, n_models: usize) -> String {
+    #[derive(Serialize)]
+    struct Origin<'a> {
+        seed: u64,
+        n_models: usize,
+        procedural: bool,
+        crop_size: usize,
+        crop_margin: f32,
+        box_jitter: f32,
+        data: &'a DataConfig,
+    }
+    let origin = Origin {
+        seed: config.seed,
+        n_models,
+        procedural: config.data.meshes.is_none(),
+        crop_size: config.regressors.network.crop_size,
+        crop_margin: config.regressors.network.crop_margin,
+        box_jitter: config.regressors.box_jitter,
+        data: &DataConfig { meshes: None, cache: None, ..config.data.clone() },
+    };
+    let text = toml::to_string(&origin).expect("configs are plain tables");
+    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// What is known of a crop, in the words of `transforms.json`.
+#[derive(Serialize)]
+struct Metadata {
+    seed: u64,
+    model: usize,
+    view: usize,
+    w: usize,
+    h: usize,
+    fl_x: f32,
+    fl_y: f32,
+    cx: f32,
+    cy: f32,
+    world: &'static str,
+    transform_matrix: TransformMatrix,
+}
+
+fn sample(config: &TrainingConfig, crop: &Crop, model: usize) -> Sample {
+    let size = config.regressors.network.crop_size;
+    let [focal, center] = [crop.focal_ratio * size as f32, size as f32 / 2.0];
+    let metadata = Metadata {
+        seed: config.seed,
+        model,
+        view: crop.view,
+        w: size,
+        h: size,
+        fl_x: focal,
+        fl_y: focal,
+        cx: center,
+        cy: center,
+        world: "canonical",
+        transform_matrix: transform_matrix(&crop.crop_from_world),
+    };
+    let pixels = crop.pixels.as_chunks::<4>().0;
+    let pixel = |x: u32, y: u32| pixels[y as usize * size + x as usize];
+    let color = RgbImage::from_fn(size as u32, size as u32, |x, y| {
+        let [red, green, blue, _] = pixel(x, y);
+        [red, green, blue].into()
+    });
+    let mask = GrayImage::from_fn(size as u32, size as u32, |x, y| [pixel(x, y)[3]].into());
+    Sample::new(&color, &mask, &metadata)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::formats::webdataset::merge_shards;
+    use std::path::PathBuf;
+
+    fn config() -> TrainingConfig {
+        let mut config = TrainingConfig::default();
+        config.data = DataConfig {
+            n_models: 5,
+            views_per_model: 2,
+            paints_per_model: 2,
+            ..DataConfig::default()
+        };
+        config.regressors.network.crop_size = 16;
+        config
+    }
+
+    /// Writes parts of the dataset, and returns their tars.
+    fn write(parts: &[&str], out: &Path) -> Vec<PathBuf> {
+        let write = |text: &&str| {
+            let part: Part = text.parse().expect("a part");
+            write_shard(&config(), part, out).expect("it is writable");
+            out.join(part.file_name("crops", "tar"))
+        };
+        parts.iter().map(write).collect()
+    }
+
+    #[test]
+    fn merged_shards_are_one_run_byte_for_byte() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let [one, many, merged] = ["one", "many", "merged"].map(|name| folder.path().join(name));
+        let whole = &write(&["1/1"], &one)[0];
+        let shards = write(&["3/3", "1/3", "2/3"], &many);
+
+        fs::create_dir(&merged).expect("writable");
+        let out = merged.join("crops.tar");
+        let contents = merge_shards(&shards, &out).expect("all are there");
+        assert_eq!((contents.samples, contents.total), (0..10, 10));
+        for extension in ["tar", "json"] {
+            let bytes =
+                |path: &Path| fs::read(path.with_extension(extension)).expect("it is there");
+            assert!(bytes(&out) == bytes(whole), "{extension}");
+        }
+    }
+
+    #[test]
+    fn another_seed_or_view_count_is_another_dataset() {
+        let print = |config: &TrainingConfig| fingerprint(config, 5);
+        let mut other = config();
+        assert_eq!(print(&other), print(&config()));
+        other.data.meshes = None;
+        other.seed = 1;
+        assert_ne!(print(&other), print(&config()));
+        other = config();
+        other.data.views_per_model = 3;
+        assert_ne!(print(&other), print(&config()));
+        // How long to train on the crops is another matter.
+        other = config();
+        other.regressors.schedule.steps += 1;
+        assert_eq!(print(&other), print(&config()));
+    }
+}
