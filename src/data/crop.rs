@@ -119,12 +119,12 @@ fn ray(Intrinsics { focal, center }: &Intrinsics, pixel: [f32; 2]) -> Vector3<f3
     Vector3::new((pixel[0] - center[0]) / focal[0], (pixel[1] - center[1]) / focal[1], 1.0)
 }
 
-fn in_picture(picture: &ScalarImage, [x, y]: [f32; 2]) -> bool {
+pub(super) fn in_picture(picture: &ScalarImage, [x, y]: [f32; 2]) -> bool {
     (0.0..picture.width() as f32).contains(&x) && (0.0..picture.height() as f32).contains(&y)
 }
 
 /// Adds `share` of the picture's value at `pixel`, or at the nearest one in the picture.
-fn add_bilinear<P, const N: usize>(
+pub(super) fn add_bilinear<P, const N: usize>(
     sum: &mut [f32; N],
     picture: &image::ImageBuffer<P, Vec<f32>>,
     [x, y]: [f32; 2],
