@@ -21,6 +21,9 @@ use object_pba::{
 };
 use tempfile::TempDir;
 
+/// Entries of a matrix differ by this much where a quaternion of f32 differs in its last bit.
+const TO_THE_BIT: f32 = 2.0 * f32::EPSILON;
+
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
 }
@@ -263,7 +266,7 @@ fn tum_lines_hold_where_each_camera_stands() {
             nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, i, j, k));
         let world_from_camera =
             Isometry3::from_parts(nalgebra::Translation3::new(x, y, z), rotation);
-        check_poses(&[world_from_camera.inverse().cast()], &[*pose], f32::EPSILON);
+        check_poses(&[world_from_camera.inverse().cast()], &[*pose], TO_THE_BIT);
     }
 }
 
@@ -332,7 +335,7 @@ fn our_own_files_read_back() {
     let path = folder.path().join("transforms.json");
     nerfstudio::write_trajectory(&path, &trajectory).unwrap();
     let back = nerfstudio::read_trajectory(&path).unwrap();
-    check_poses(&back.camera_from_world, &trajectory.camera_from_world, f32::EPSILON);
+    check_poses(&back.camera_from_world, &trajectory.camera_from_world, TO_THE_BIT);
     assert_eq!((back.intrinsics, back.size), (trajectory.intrinsics, trajectory.size));
     let path = folder.path().join("points.ply");
     ply::write_points(&path, &cloud).unwrap();

@@ -36,7 +36,7 @@ pub fn from_opengl_matrix(transform: &TransformMatrix) -> Result<Isometry3<f32>,
 
 /// The world-from-camera matrix for a `transforms.json`.
 pub fn to_opengl_matrix(camera_from_world: &Isometry3<f32>) -> TransformMatrix {
-    let world_from_camera = camera_from_world.cast::<f64>().inverse() * half_turn_about_x();
+    let world_from_camera = double(camera_from_world).inverse() * half_turn_about_x();
     let matrix = world_from_camera.to_homogeneous();
     [0, 1, 2, 3].map(|row| [0, 1, 2, 3].map(|column| matrix[(row, column)]))
 }
@@ -61,7 +61,7 @@ pub fn from_colmap([w, i, j, k]: [f64; 4], t: [f64; 3]) -> Result<Isometry3<f32>
 
 /// COLMAP's `[qw, qx, qy, qz]` and `[tx, ty, tz]`.
 pub fn to_colmap(camera_from_world: &Isometry3<f32>) -> ([f64; 4], [f64; 3]) {
-    let pose = camera_from_world.cast::<f64>();
+    let pose = double(camera_from_world);
     let imaginary = pose.rotation.imag();
     let quaternion = [pose.rotation.w, imaginary.x, imaginary.y, imaginary.z];
     (quaternion, pose.translation.vector.into())
@@ -69,7 +69,7 @@ pub fn to_colmap(camera_from_world: &Isometry3<f32>) -> ([f64; 4], [f64; 3]) {
 
 /// TUM's `[tx, ty, tz, qx, qy, qz, qw]`.
 pub fn to_tum(camera_from_world: &Isometry3<f32>) -> [f64; 7] {
-    let pose = camera_from_world.cast::<f64>().inverse();
+    let pose = double(camera_from_world).inverse();
     let [t, q] = [pose.translation.vector, pose.rotation.imag()];
     [t.x, t.y, t.z, q.x, q.y, q.z, pose.rotation.w]
 }
@@ -103,6 +103,14 @@ fn rigid(transform: &TransformMatrix) -> Result<Isometry3<f64>, String> {
         Translation3::from(position),
         UnitQuaternion::from_rotation_matrix(&rotation),
     ))
+}
+
+/// In double precision, in which a quaternion of f32 is not of length 1: inverting it would cost a bit
+/// of the translation.
+fn double(pose: &Isometry3<f32>) -> Isometry3<f64> {
+    let pose = pose.cast();
+    let rotation = UnitQuaternion::new_normalize(pose.rotation.into_inner());
+    Isometry3::from_parts(pose.translation, rotation)
 }
 
 /// Between OpenCV's camera axes and OpenGL's. It is its own inverse.

@@ -1,6 +1,6 @@
 //! What every layout of a sequence comes down to: pictures, their masks, cameras and poses.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use image::DynamicImage;
 use nalgebra::{Isometry3, Point3};
@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use super::{
     calibration::{Calibration, Distortion},
     hints::SequenceHints,
+    masks::{MaskSource, alpha, off_background},
     natural_order::natural_order,
-    pictures::{self, MaskSource, alpha, off_background, unusable},
+    pictures::{self, unusable},
     undistortion::undistort,
 };
 use crate::{
@@ -66,7 +67,7 @@ impl Listing {
     }
 
     /// Opens all pictures and brings them to the pinhole camera of the first one.
-    pub fn load(mut self, path: &std::path::Path) -> Result<(Sequence, Vec<String>)> {
+    pub fn load(mut self, path: &Path) -> Result<(Sequence, Vec<String>)> {
         let Some(first) = self.shots.first() else {
             return Err(unusable(path, "it has no frames, or none that were asked for"));
         };

@@ -12,6 +12,7 @@ pub mod npz;
 mod calibration;
 mod exif;
 mod listing;
+mod masks;
 mod natural_order;
 mod pictures;
 mod plain;

@@ -18,7 +18,8 @@ use super::{
     Trajectory,
     hints::SequenceHints,
     listing::{Listing, Shot},
-    pictures::{self, MaskSource, mask_beside, mask_in, mask_to_luma8, unusable, write_png},
+    masks::{MaskSource, mask_beside, mask_in, mask_to_luma8},
+    pictures::{self, unusable, write_png},
     ply::{PointCloud, read_points, write_points},
 };
 use crate::{Error, Result, data::sequence::Sequence};

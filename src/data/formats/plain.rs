@@ -7,7 +7,8 @@ use super::{
     exif::focal_in_pixels,
     hints::SequenceHints,
     listing::{Listing, Shot},
-    pictures::{self, mask_beside, mask_in, pictures_in, unusable},
+    masks::{mask_beside, mask_in},
+    pictures::{self, pictures_in, unusable},
 };
 use crate::Result;
 

@@ -10,7 +10,8 @@ use super::{
     calibration::Calibration,
     hints::SequenceHints,
     listing::{Listing, Shot},
-    pictures::{self, MaskSource, mask_in, unusable},
+    masks::{MaskSource, mask_in},
+    pictures::{self, unusable},
 };
 use crate::{Error, Result};
 

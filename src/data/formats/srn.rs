@@ -12,7 +12,8 @@ use super::{
     calibration::{Calibration, Distortion},
     hints::SequenceHints,
     listing::{Listing, Shot},
-    pictures::{MaskSource, mask_in, pictures_in, unusable},
+    masks::{MaskSource, mask_in},
+    pictures::{pictures_in, unusable},
 };
 use crate::{Error, Result};
 

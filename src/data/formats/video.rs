@@ -11,7 +11,8 @@ use std::{
 use super::{
     hints::SequenceHints,
     listing::{Listing, Shot},
-    pictures::{self, MaskSource, mask_in, pictures_in, unusable},
+    masks::{MaskSource, mask_in},
+    pictures::{self, pictures_in, unusable},
 };
 use crate::{Error, Result};
 

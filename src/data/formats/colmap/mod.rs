@@ -19,7 +19,8 @@ use super::{
     calibration::Calibration,
     hints::SequenceHints,
     listing::{Listing, Shot},
-    pictures::{mask_beside, mask_in, unusable},
+    masks::{mask_beside, mask_in},
+    pictures::unusable,
 };
 use crate::Result;
 

@@ -63,7 +63,7 @@ fn models_round_trip_to_the_last_bit_of_f32() {
         intrinsics: Intrinsics { focal: [123.071_014, 120.3], center: [64.1, 33.3] },
         size: [128, 96],
         camera_from_world: poses.clone(),
-        pictures: ["images/a b.png", "images/c.png", "d.png"].map(PathBuf::from).to_vec(),
+        pictures: ["images/a b.png", "../images/c.png", "d.png"].map(PathBuf::from).to_vec(),
         canonical: true,
     };
     let points = vec![Point3::new(0.1, -2e-7, 3.25)];

@@ -43,7 +43,7 @@ pub fn write(folder: &Path, trajectory: &Trajectory, cloud: &PointCloud) -> Resu
         trajectory.camera_from_world.iter().zip(&trajectory.pictures).enumerate()
     {
         let ([w, i, j, k], [x, y, z]) = axes::to_colmap(pose);
-        let name = picture.strip_prefix("images").unwrap_or(picture).display();
+        let name = below_images(picture).display();
         // The empty line stands for 2D points.
         let line = format!("{} {w} {i} {j} {k} {x} {y} {z} 1 {name}\n\n", idx + 1);
         images += &line;
@@ -57,6 +57,17 @@ pub fn write(folder: &Path, trajectory: &Trajectory, cloud: &PointCloud) -> Resu
         writeln!(points, "{} {x} {y} {z} {r} {g} {b} 0", idx + 1).expect("a string grows");
     }
     write_atomically(&folder.join("points3D.txt"), points.as_bytes())
+}
+
+/// COLMAP's names start below the folder of the pictures.
+fn below_images(picture: &Path) -> &Path {
+    let mut rest = picture;
+    for up in [".", ".."] {
+        while let Ok(below) = rest.strip_prefix(up) {
+            rest = below;
+        }
+    }
+    rest.strip_prefix("images").unwrap_or(rest)
 }
 
 /// Calls back for each line that is neither empty nor a comment; errors name its number.
