@@ -242,7 +242,7 @@ fn a_video_s_frames_are_those_that_ffmpeg_extracts() {
     let extra = ["--frames", "5..9", "--every", "2", "--fov", "50"];
     // The sample's pictures have no alpha channel, and no masks are named after the video's frames.
     let output = run_video(folder.path(), &path, &extra);
-    check_refused(&output, &["000001.png", "neither a mask"]);
+    check_refused(&output, &["clip.mp4", "no alpha channel", "--masks"]);
     let arguments = fs::read_to_string(folder.path().join("arguments")).unwrap();
     assert!(arguments.contains("select='gte(n,5)*not(mod(n-5,2))*lt(n,9)'"), "{arguments}");
 

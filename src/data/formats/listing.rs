@@ -83,7 +83,9 @@ impl Listing {
         self.note_resampling(&intrinsics, size);
 
         let load = |shot: &Shot| shot.load(&intrinsics, size);
-        let frames: Vec<Frame> = self.shots.par_iter().map(load).collect::<Result<_>>()?;
+        let frames: Vec<Result<Frame>> = self.shots.par_iter().map(load).collect();
+        // Of several broken frames, the first one is named, whichever thread was faster.
+        let frames = frames.into_iter().collect::<Result<_>>()?;
         let Self { name, canonical, points, notes, .. } = self;
         let truth = camera_from_world.map(|camera_from_world| Truth {
             camera_from_world,

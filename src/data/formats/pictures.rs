@@ -45,6 +45,13 @@ pub fn size(path: &Path, upright: bool) -> Result<[usize; 2]> {
     Ok(size)
 }
 
+/// Whether a picture has an alpha channel.
+pub fn has_alpha(path: &Path) -> Result<bool> {
+    let decoder = reader(path)?.into_decoder();
+    let decoder = decoder.map_err(|error| unusable(path, &error.to_string()))?;
+    Ok(decoder.color_type().has_alpha())
+}
+
 /// Opens a picture, as stored or, if `upright`, turned as its EXIF data say.
 pub fn open(path: &Path, upright: bool) -> Result<DynamicImage> {
     let unusable = |error: image::ImageError| unusable(path, &error.to_string());

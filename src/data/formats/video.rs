@@ -38,6 +38,12 @@ pub(super) fn list(path: &Path, hints: &SequenceHints, scratch: &Scratch) -> Res
     if mask_frames.as_ref().is_some_and(|masks| masks.len() != frames.len()) {
         return Err(unusable(path, "the video of its masks has another number of frames"));
     }
+    if let (None, Some(first)) = (&hints.masks, frames.first())
+        && !pictures::has_alpha(first)?
+    {
+        let reason = "it has no alpha channel; give its masks by --masks, a video or a folder of frame_000000.png and so on";
+        return Err(unusable(path, reason));
+    }
     let mut taken = (0..).filter(|&idx| hints.selects(idx));
     let mut shots = vec![];
     for (idx, path_of_frame) in frames.into_iter().enumerate() {
