@@ -72,8 +72,10 @@ impl Distortion {
         const STEPS: usize = 512;
         let radius = |step: usize| limit * step as f64 / STEPS as f64;
         let distorted = |step| radius(step) * self.stretch(radius(step) * radius(step));
-        let folds = (0..STEPS).find(|&step| !(distorted(step + 1) > distorted(step)));
-        folds.map_or(limit, radius)
+        let grows = |step: &usize| distorted(step + 1) > distorted(*step);
+        let n_growing = (0..STEPS).take_while(grows).count();
+        // Without a fold, the limit to the last bit.
+        if n_growing == STEPS { limit } else { radius(n_growing) }
     }
 
     /// (1 + k1 r² + k2 r⁴ + k3 r⁶) / (1 + k4 r² + k5 r⁴ + k6 r⁶).

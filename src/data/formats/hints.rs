@@ -25,7 +25,7 @@ impl SequenceHints {
     /// Whether to take this frame, but for `max_frames`.
     pub(super) fn selects(&self, frame_idx: usize) -> bool {
         let Range { start, end } = self.frames.clone().unwrap_or(0..usize::MAX);
-        (start..end).contains(&frame_idx) && (frame_idx - start) % self.every.max(1) == 0
+        (start..end).contains(&frame_idx) && (frame_idx - start).is_multiple_of(self.every.max(1))
     }
 
     /// A pinhole for pictures of this size, if a focal length or field of view is given.
