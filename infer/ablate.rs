@@ -12,12 +12,12 @@ use object_pba::{
     },
     checkpoint::Prior,
     config::write_config,
-    data::{formats::nerfstudio::read_sequence, sequence::Sequence},
+    data::sequence::Sequence,
     host::host_points,
     reconstruction::{Scores, hypotheses, initial_guess, points, score, views},
 };
 
-use crate::{Options, figures, output};
+use crate::{Options, figures, input::Input, output};
 
 /// Step size of a free point in world units, a tenth of the spacing of 6,144 points on a car.
 const POINT_RATE: f64 = 2e-3;
@@ -36,7 +36,7 @@ pub fn ablate(sequences: &[std::path::PathBuf], out: &Path, options: &Options) -
     let mut table = String::from("| sequence | | initial | shape prior | free points |\n");
     table += "| --- | --- | --- | --- | --- |\n";
     for path in sequences {
-        let sequence = read_sequence(path)?;
+        let sequence = Input::default().read(path)?;
         let arms = compare(&prior, &sequence, &config, &device)?;
         for (name, value) in output::ROWS {
             let cell = |scores: &Scores| value(scores).map_or("–".into(), output::significant);

@@ -8,7 +8,9 @@ use std::{
 use anyhow::{Context, Result, bail};
 use indicatif::{ParallelProgressIterator, ProgressStyle};
 use object_pba::{
-    config::write_config, data::formats::nerfstudio::read_sequence, reconstruction::Scores,
+    config::write_config,
+    data::formats::{Layout, SequenceHints, read_sequence},
+    reconstruction::Scores,
 };
 use rayon::prelude::*;
 use serde::Serialize;
@@ -37,7 +39,7 @@ pub fn evaluate(dataset: &Path, out: &Path, options: &Options) -> Result<()> {
     let style = "{bar:30} {pos}/{len} {elapsed_precise} (ETA {eta})";
     let style = ProgressStyle::with_template(style).expect("a valid template");
     let reconstruct = |path: &PathBuf| -> Result<Report> {
-        let sequence = read_sequence(path)?;
+        let sequence = read_sequence(path, &SequenceHints::default())?.sequence;
         Ok(reconstruct_and_score(&prior, &sequence, &config, options.device, &mut |_, _| {})?
             .report)
     };
@@ -67,19 +69,23 @@ pub fn evaluate(dataset: &Path, out: &Path, options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// The folders below `dataset` that hold a `transforms.json`, in order of their names.
+/// The folders below `dataset` that hold a sequence with its camera, in order of their names.
 fn sequences_below(dataset: &Path) -> Result<Vec<PathBuf>> {
     let entries =
         fs::read_dir(dataset).with_context(|| format!("cannot read {}", dataset.display()))?;
     let mut folders: Vec<PathBuf> = entries
         .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.join("transforms.json").is_file())
+        .filter(|path| path.is_dir() && states_its_camera(path))
         .collect();
     folders.sort();
     if folders.is_empty() {
-        bail!("{}: no folder below it holds a transforms.json", dataset.display());
+        bail!("{}: no folder below it holds a sequence", dataset.display());
     }
     Ok(folders)
+}
+
+fn states_its_camera(folder: &Path) -> bool {
+    Layout::detect(folder).is_ok_and(|layout| !matches!(layout, Layout::Plain(_)))
 }
 
 /// Mean and median before and after, over all sequences and over those of each model.

@@ -1,9 +1,11 @@
-//! pba-infer: reconstruct sequences, judge them, and ablate the prior.
+//! pba-infer: reconstruct sequences, judge them, ablate the prior, and export results.
 
 mod ablate;
 mod assets;
 mod evaluate;
+mod export;
 mod figures;
+mod input;
 mod output;
 mod run;
 
@@ -18,6 +20,9 @@ use object_pba::{
     config::read_config,
     device::Backend,
 };
+
+use export::Format;
+use input::Input;
 
 /// Large tensors come and go with every operation; the system's allocator returns each one's pages
 /// to the kernel and faults them in again, which doubles a training step.
@@ -41,12 +46,15 @@ enum Command {
         #[command(flatten)]
         options: Options,
     },
-    /// Reconstruct a sequence: a folder with a transforms.json, frames and masks.
+    /// Reconstruct a sequence: a transforms.json, COLMAP model, SRN folder, 3D-R2N2 rendering, folder of
+    /// pictures and masks, or video.
     Run {
         sequence: PathBuf,
         /// Folder for the results.
         #[arg(long)]
         out: PathBuf,
+        #[command(flatten)]
+        input: Input,
         #[command(flatten)]
         options: Options,
     },
@@ -69,9 +77,21 @@ enum Command {
         #[command(flatten)]
         options: Options,
     },
+    /// Write the results of a run in the formats of other programs.
+    Export {
+        /// The folder that `run` or `demo` wrote.
+        run: PathBuf,
+        #[arg(
+            long = "format",
+            value_enum,
+            value_delimiter = ',',
+            default_value = "colmap,tum,glb,npz"
+        )]
+        formats: Vec<Format>,
+    },
 }
 
-/// What every command understands.
+/// What every command that reconstructs understands.
 #[derive(Args)]
 struct Options {
     /// Folder of a trained prior; the bundled car prior when left out.
@@ -110,9 +130,12 @@ impl Options {
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Demo { out, options } => run::demo(&out, &options),
-        Command::Run { sequence, out, options } => run::run(&sequence, &out, &options),
+        Command::Run { sequence, out, input, options } => {
+            run::run(&sequence, &out, &input, &options)
+        }
         Command::Evaluate { dataset, out, options } => evaluate::evaluate(&dataset, &out, &options),
         Command::Ablate { sequences, out, options } => ablate::ablate(&sequences, &out, &options),
+        Command::Export { run, formats } => export::export(&run, &formats),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

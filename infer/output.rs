@@ -9,7 +9,7 @@ use object_pba::{
     checkpoint::Prior,
     config::write_config,
     data::{
-        formats::{nerfstudio::write_transforms, ply},
+        formats::{Trajectory, nerfstudio::write_trajectory, ply},
         sequence::Sequence,
     },
     device::Backend,
@@ -50,9 +50,14 @@ pub fn write(
     let generator = &prior.shape.generator;
     let unknowns = &reconstruction.outcome.unknowns;
     let poses = unknowns.camera_from_world(&device);
-    let names: Vec<_> = sequence.frames.iter().map(|frame| frame.path.clone()).collect();
-    let path = out.join("transforms.json");
-    write_transforms(&path, &sequence.intrinsics, sequence.size, &poses, &names, true)?;
+    let trajectory = Trajectory {
+        intrinsics: sequence.intrinsics,
+        size: sequence.size,
+        camera_from_world: poses.clone(),
+        pictures: sequence.frames.iter().map(|frame| frame.path.clone()).collect(),
+        canonical: true,
+    };
+    write_trajectory(&out.join("transforms.json"), &trajectory)?;
 
     let views = views(sequence, generator, unknowns, &config.objective.pseudo_render, &device);
     let colors = figures::point_colors(sequence, &views);

@@ -9,13 +9,13 @@ use object_pba::{
         BundleAdjustmentConfig, Outcome, Solver, Status, Step, unknowns::Unknowns,
     },
     checkpoint::Prior,
-    data::{formats::nerfstudio::read_sequence, sequence::Sequence},
+    data::sequence::Sequence,
     device::Backend,
     reconstruction::{Scores, reconstruct, score},
 };
 use serde::Serialize;
 
-use crate::{Options, assets, output};
+use crate::{Options, assets, input::Input, output};
 
 /// What `metrics.json` holds.
 #[derive(Clone, Debug, Serialize)]
@@ -43,12 +43,12 @@ pub fn demo(out: &Path, options: &Options) -> Result<()> {
     let sequence = out.join("sequence");
     assets::unpack_sample_sequence(&sequence)
         .with_context(|| format!("cannot write to {}", sequence.display()))?;
-    run(&sequence, out, options)
+    run(&sequence, out, &Input::default(), options)
 }
 
-pub fn run(sequence: &Path, out: &Path, options: &Options) -> Result<()> {
+pub fn run(sequence: &Path, out: &Path, input: &Input, options: &Options) -> Result<()> {
     let config = options.bundle_adjustment()?;
-    let sequence = read_sequence(sequence)?;
+    let sequence = input.read(sequence)?;
     let device = options.device.device().autodiff();
     let prior = options.load_prior(&device)?;
     fs::create_dir_all(out).with_context(|| format!("cannot create {}", out.display()))?;
@@ -69,6 +69,7 @@ pub fn run(sequence: &Path, out: &Path, options: &Options) -> Result<()> {
     println!("  points.ply       the cloud, coloured where it was seen");
     println!("  transforms.json  the camera of every frame");
     println!("  metrics.json, history.csv, config.toml");
+    println!("For COLMAP, TUM, GLB and NPZ: pba-infer export {}", out.display());
     Ok(())
 }
 

@@ -14,7 +14,7 @@ use crate::{
     },
     checkpoint::Prior,
     data::{
-        crop::{CropCamera, silhouette_box},
+        crop::CropCamera,
         sequence::{Frame, Sequence},
     },
     host::{host_pixels, host_points},
@@ -32,9 +32,9 @@ pub struct InitialGuess {
 
 /// Regresses style and pose from a frame; `None` when its mask is empty.
 pub fn initial_guess(prior: &Prior, sequence: &Sequence, frame: &Frame) -> Option<InitialGuess> {
-    let silhouette = silhouette_box(&frame.mask, MASK_THRESHOLD)?;
     let (size, margin) = (prior.regressors.crop_size(), prior.regressors.crop_margin());
-    let crop = CropCamera::around(silhouette, &sequence.intrinsics, size, margin);
+    let (mask, intrinsics) = (&frame.mask, &sequence.intrinsics);
+    let crop = CropCamera::around_silhouette(mask, MASK_THRESHOLD, intrinsics, size, margin)?;
     let (color, mask) = crop.warp(&frame.color, &frame.mask);
     let guess = prior.regressors.regress(&color, &mask, &crop);
     let to_camera = |(pose, confidence)| (crop.camera_from_world(&pose), confidence);

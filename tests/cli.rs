@@ -311,3 +311,82 @@ fn a_broken_mesh_is_refused_with_its_file_and_line() {
     ]);
     check_refused(&output, &["02958343", "model_normalized.obj", "line 4"]);
 }
+
+/// A finished run, as far as `export` reads it: the sample sequence has the same files.
+#[test]
+fn a_run_is_exported_to_every_format() {
+    let run = sample();
+    let output = pba_infer(&["export", run.path().to_str().unwrap()]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    for name in ["colmap/images.txt", "trajectory.txt", "scene.glb", "run.npz"] {
+        assert!(run.path().join(name).metadata().unwrap().len() > 0, "{name} is empty");
+    }
+    fs::remove_file(run.path().join("points.ply")).unwrap();
+    let output = pba_infer(&["export", run.path().to_str().unwrap(), "--format", "tum,glb"]);
+    check_refused(&output, &["points.ply"]);
+}
+
+/// A folder with a file that is called a video, and a program that is called ffmpeg.
+#[cfg(unix)]
+fn video(ffmpeg: &str) -> TempDir {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = TempDir::new().unwrap();
+    fs::write(folder.path().join("clip.mp4"), "frames").unwrap();
+    let program = folder.path().join("ffmpeg");
+    fs::write(&program, ffmpeg).unwrap();
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    folder
+}
+
+#[cfg(unix)]
+fn run_video(folder: &Path, path: &str, extra: &[&str]) -> Output {
+    let video = folder.join("clip.mp4");
+    let out = folder.join("out");
+    let arguments = ["run", video.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    let arguments = [&arguments[..], extra].concat();
+    let mut command = Command::cargo_bin("pba-infer").unwrap();
+    command.env("PATH", path).args(arguments).output().unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_video_without_ffmpeg_says_what_to_install() {
+    let folder = video("");
+    check_refused(&run_video(folder.path(), "/nowhere", &[]), &["clip.mp4", "ffmpeg", "install"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_video_s_frames_are_those_that_ffmpeg_extracts() {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/sample-sequence/images");
+    // The last argument is the pattern of the frames, in the folder where they go.
+    let folder = video(&format!(
+        "#!/bin/sh\nfor last; do :; done\necho \"$*\" > \"$(dirname \"$0\")/arguments\"\n\
+         cp {0}/frame_000.png \"$(dirname \"$last\")/000001.png\"\n\
+         cp {0}/frame_001.png \"$(dirname \"$last\")/000002.png\"\n",
+        source.display()
+    ));
+    let path = format!("{}:{}", folder.path().display(), std::env::var("PATH").unwrap());
+    let extra = ["--frames", "5..9", "--every", "2", "--fov", "50"];
+    // The sample's pictures have no alpha channel, and no masks are named after the video's frames.
+    let output = run_video(folder.path(), &path, &extra);
+    check_refused(&output, &["clip.mp4", "no alpha channel", "--masks"]);
+    let arguments = fs::read_to_string(folder.path().join("arguments")).unwrap();
+    assert!(arguments.contains("select='gte(n,5)*not(mod(n-5,2))*lt(n,9)'"), "{arguments}");
+
+    let masks = folder.path().join("video_masks");
+    copy(&source.with_file_name("masks"), &masks);
+    for (from, to) in [("frame_000.png", "frame_000005.png"), ("frame_001.png", "frame_000007.png")]
+    {
+        fs::rename(masks.join(from), masks.join(to)).unwrap();
+    }
+    let quick = folder.path().join("quick.toml");
+    fs::write(&quick, "blurs = [1.0]\n[lm]\niterations = 1\n").unwrap();
+    let [masks, quick] = [&masks, &quick].map(|path| path.to_str().unwrap());
+    let extra = [&extra[..], &["--masks", masks, "--config", quick]].concat();
+    let output = run_video(folder.path(), &path, &extra);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && message.contains("video, 2 frames of 128"), "{message}");
+    let cameras = fs::read_to_string(folder.path().join("out/transforms.json")).unwrap();
+    assert!(cameras.contains("frame_000005.png") && cameras.contains("frame_000007.png"));
+}

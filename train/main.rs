@@ -3,8 +3,8 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::{Args, Parser, Subcommand};
-use inspect::InspectArguments;
 use coverage::CoverageArguments;
+use inspect::InspectArguments;
 use object_pba::{
     Error, Result,
     device::Backend,

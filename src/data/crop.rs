@@ -31,15 +31,52 @@ impl CropCamera {
     pub fn around(box_in_pixels: [f32; 4], source: &Intrinsics, size: usize, margin: f32) -> Self {
         let [left, top, right, bottom] = box_in_pixels;
         let axis = ray(source, [(left + right) / 2.0, (top + bottom) / 2.0]);
-        // No rotation between opposite directions is unique; no ray with z = 1 opposes the axis.
+        let corners = [[left, top], [right, top], [left, bottom], [right, bottom]];
+        Self::along(axis, &corners.map(|corner| ray(source, corner)), source, size, margin)
+    }
+
+    /// Looks at the middle of a silhouette and holds all of it; `None` if the mask is empty.
+    ///
+    /// The box that is centred and fitted is the one that the crop's own camera sees, so that the crop
+    /// is the same wherever in a picture the object lies: off the axis, pictures stretch.
+    pub fn around_silhouette(
+        mask: &ScalarImage,
+        threshold: f32,
+        source: &Intrinsics,
+        size: usize,
+        margin: f32,
+    ) -> Option<Self> {
+        /// Each brings the middle some ten times nearer.
+        const CORRECTIONS: usize = 4;
+        let mut crop = Self::around(silhouette_box(mask, threshold)?, source, size, margin);
+        let rays: Vec<Vector3<f32>> =
+            outline(mask, threshold).into_iter().map(|pixel| ray(source, pixel)).collect();
+        for _ in 0..CORRECTIONS {
+            let seen = rays.iter().map(|ray| crop.crop_from_camera * ray);
+            let slopes = seen.map(|ray| [ray.x / ray.z, ray.y / ray.z]);
+            let [left, top, right, bottom] = bounds(slopes.map(|[x, y]| [x, y, x, y]))?;
+            let middle = Vector3::new((left + right) / 2.0, (top + bottom) / 2.0, 1.0);
+            let axis = crop.crop_from_camera.inverse() * middle;
+            crop = Self::along(axis, &rays, source, size, margin);
+        }
+        Some(crop)
+    }
+
+    /// Looks along `axis` and holds all rays, both in the source's frame.
+    fn along(
+        axis: Vector3<f32>,
+        rays: &[Vector3<f32>],
+        source: &Intrinsics,
+        size: usize,
+        margin: f32,
+    ) -> Self {
+        // No rotation between opposite directions is unique; no ray with z > 0 opposes the axis.
         let crop_from_camera =
             UnitQuaternion::rotation_between(&axis, &Vector3::z()).unwrap_or_default();
-
-        let corners = [[left, top], [right, top], [left, bottom], [right, bottom]];
-        let reach = corners
-            .map(|corner| crop_from_camera * ray(source, corner))
+        let reach = rays
+            .iter()
+            .map(|ray| crop_from_camera * ray)
             .map(|ray| (ray.x / ray.z).abs().max((ray.y / ray.z).abs()))
-            .into_iter()
             .fold(f32::MIN_POSITIVE, f32::max);
         let half = size as f32 / 2.0;
         let focal = half * (1.0 - 2.0 * margin) / reach;
@@ -108,10 +145,25 @@ pub fn jitter([left, top, right, bottom]: [f32; 4], fraction: f32, rng: &mut imp
 
 /// The box `[left, top, right, bottom]`, in pixels, around all mask values above `threshold`.
 pub fn silhouette_box(mask: &ScalarImage, threshold: f32) -> Option<[f32; 4]> {
-    mask.enumerate_pixels()
-        .filter(|(_, _, value)| value.0[0] > threshold)
-        .map(|(x, y, _)| [x as f32, y as f32, x as f32 + 1.0, y as f32 + 1.0])
-        .reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])])
+    let covered = mask.enumerate_pixels().filter(|(_, _, value)| value.0[0] > threshold);
+    bounds(covered.map(|(x, y, _)| [x as f32, y as f32, x as f32 + 1.0, y as f32 + 1.0]))
+}
+
+/// The corners of the first and the last covered pixel of each row: all that bounds need.
+fn outline(mask: &ScalarImage, threshold: f32) -> Vec<[f32; 2]> {
+    let ends = |(y, row): (u32, image::buffer::Pixels<Luma<f32>>)| {
+        let covered = |value: &Luma<f32>| value.0[0] > threshold;
+        let values: Vec<bool> = row.map(covered).collect();
+        let first = values.iter().position(|covered| *covered)?;
+        let last = values.iter().rposition(|covered| *covered)?;
+        Some([y, y + 1].map(|y| [[first as f32, y as f32], [last as f32 + 1.0, y as f32]]))
+    };
+    (0..).zip(mask.rows()).filter_map(ends).flatten().flatten().collect()
+}
+
+/// The box `[left, top, right, bottom]` around boxes.
+fn bounds(boxes: impl Iterator<Item = [f32; 4]>) -> Option<[f32; 4]> {
+    boxes.reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1]), a[2].max(b[2]), a[3].max(b[3])])
 }
 
 /// The direction through a pixel, with z = 1.
@@ -119,12 +171,12 @@ fn ray(Intrinsics { focal, center }: &Intrinsics, pixel: [f32; 2]) -> Vector3<f3
     Vector3::new((pixel[0] - center[0]) / focal[0], (pixel[1] - center[1]) / focal[1], 1.0)
 }
 
-fn in_picture(picture: &ScalarImage, [x, y]: [f32; 2]) -> bool {
+pub(super) fn in_picture(picture: &ScalarImage, [x, y]: [f32; 2]) -> bool {
     (0.0..picture.width() as f32).contains(&x) && (0.0..picture.height() as f32).contains(&y)
 }
 
 /// Adds `share` of the picture's value at `pixel`, or at the nearest one in the picture.
-fn add_bilinear<P, const N: usize>(
+pub(super) fn add_bilinear<P, const N: usize>(
     sum: &mut [f32; N],
     picture: &image::ImageBuffer<P, Vec<f32>>,
     [x, y]: [f32; 2],
@@ -235,6 +287,25 @@ mod tests {
         let [x, y] = project(&Point3::from(corner), &crop.intrinsics);
         let inside = 6.3..57.7;
         assert!(inside.contains(&x) && inside.contains(&y), "{x}, {y}");
+    }
+
+    #[test]
+    fn a_silhouette_s_crop_is_the_same_wherever_it_lies() {
+        let mesh = ball();
+        let scene = Scene::random(&mut keyed_rng(1, [0, 0]), None);
+        // The camera in its place turns the object from the middle of its picture into a corner.
+        let centred = Isometry3::translation(0.0, 0.0, 1.6) * pose().rotation;
+        let aside = Vector3::new(-0.25, 0.12, 1.0);
+        let turn = UnitQuaternion::rotation_between(&Vector3::z(), &aside).expect("not opposite");
+        let crops = [UnitQuaternion::identity(), turn].map(|turn| {
+            let picture = render(&mesh, &scene, &(turn * centred), &SOURCE, SIZE);
+            let crop = CropCamera::around_silhouette(&picture.coverage, 0.5, &SOURCE, 64, 0.1);
+            let crop = crop.expect("it is in view");
+            (crop.crop_from_camera * turn, crop.intrinsics.focal[0])
+        });
+        let [(first, focal), (second, other)] = crops;
+        assert!(first.angle_to(&second).to_degrees() < 0.3, "{}", first.angle_to(&second));
+        assert!((focal / other - 1.0).abs() < 0.02, "{focal} and {other}");
     }
 
     #[test]

@@ -16,7 +16,7 @@ use crate::{
     Error, Result,
     config::write_config,
     data::formats::{
-        axes::{TransformMatrix, transform_matrix},
+        axes::{TransformMatrix, to_opengl_matrix},
         webdataset::{Contents, Part, Sample, ShardWriter, is_finished},
     },
 };
@@ -113,7 +113,7 @@ fn sample(config: &TrainingConfig, crop: &Crop, model: usize) -> Sample {
         cx: center,
         cy: center,
         world: "canonical",
-        transform_matrix: transform_matrix(&crop.crop_from_world),
+        transform_matrix: to_opengl_matrix(&crop.crop_from_world),
     };
     let pixels = crop.pixels.as_chunks::<4>().0;
     let pixel = |x: u32, y: u32| pixels[y as usize * size + x as usize];

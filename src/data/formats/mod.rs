@@ -1,13 +1,52 @@
 //! Files that other programs read and write too.
 
 pub mod axes;
+pub mod hints;
+pub mod layout;
 pub mod nerfstudio;
+pub mod colmap;
 pub mod ply;
 pub mod webdataset;
+pub mod tum;
+pub mod glb;
+pub mod npz;
+mod calibration;
+mod exif;
+mod listing;
+mod masks;
+mod natural_order;
+mod pictures;
+mod plain;
+mod r2n2;
+mod srn;
+mod undistortion;
+mod video;
 
-use std::{fs, path::Path, process};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process,
+};
 
-use crate::{Error, Result};
+use nalgebra::Isometry3;
+
+use crate::{Error, Result, camera::Intrinsics};
+pub use hints::SequenceHints;
+pub use layout::{Layout, Reading, read_sequence};
+
+/// One camera on its way, without the pictures that it took: what files of cameras hold.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trajectory {
+    pub intrinsics: Intrinsics,
+    /// `[width, height]` of every picture, in pixels.
+    pub size: [usize; 2],
+    /// One pose a picture.
+    pub camera_from_world: Vec<Isometry3<f32>>,
+    /// The pictures' files.
+    pub pictures: Vec<PathBuf>,
+    /// Whether the world is the object's canonical frame.
+    pub canonical: bool,
+}
 
 /// Writes a file in one step: readers see the old one or the new one, never half of it.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {

@@ -29,8 +29,28 @@ pub struct PointCloud {
     pub visible: Option<Vec<bool>>,
 }
 
-/// Reads the vertices of a PLY file, ASCII or binary; other elements and properties are left out.
+impl PointCloud {
+    /// RGB of a point; black where it has none.
+    pub fn color(&self, point_idx: usize) -> [u8; 3] {
+        let colors = self.colors.as_ref();
+        colors.and_then(|colors| colors.get(point_idx).copied()).unwrap_or_default()
+    }
+
+    /// Whether the reference frame sees a point; not where nothing is said.
+    pub fn is_visible(&self, point_idx: usize) -> bool {
+        let visible = self.visible.as_ref();
+        visible.and_then(|visible| visible.get(point_idx).copied()).unwrap_or_default()
+    }
+}
+
+/// Reads the vertices of a PLY file, ASCII or binary; all else is left out.
 pub fn read_points(path: &Path) -> Result<Vec<Point3<f32>>> {
+    Ok(read_cloud(path)?.points)
+}
+
+/// Reads the vertices of a PLY file, ASCII or binary, with their `red`, `green`, `blue` and `visible`
+/// if they are bytes; other elements and properties are left out.
+pub fn read_cloud(path: &Path) -> Result<PointCloud> {
     let unusable = |reason: String| Error::Points { path: path.into(), reason };
     let mut reader = BufReader::new(File::open(path).map_err(Error::io(path))?);
     let mut ply = Parser::<Vertex>::new()
@@ -40,11 +60,23 @@ pub fn read_points(path: &Path) -> Result<Vec<Point3<f32>>> {
     if vertices.is_empty() {
         return Err(unusable("it has no vertices".into()));
     }
-    let points: Vec<_> = vertices.into_iter().map(|vertex| vertex.position).collect();
-    match points.iter().position(|point| point.iter().any(|value| !value.is_finite())) {
-        Some(idx) => Err(unusable(format!("vertex {idx} has no finite x, y and z"))),
-        None => Ok(points),
+    let infinite = |vertex: &Vertex| vertex.position.iter().any(|value| !value.is_finite());
+    if let Some(idx) = vertices.iter().position(infinite) {
+        return Err(unusable(format!("vertex {idx} has no finite x, y and z")));
     }
+    let byte = PropertyType::Scalar(ScalarType::UChar);
+    let has_bytes = |name: &str| {
+        let element = ply.header.elements.get("vertex");
+        let property = element.and_then(|element| element.properties.get(name));
+        property.is_some_and(|property| property.data_type == byte)
+    };
+    let colored = ["red", "green", "blue"].into_iter().all(has_bytes);
+    Ok(PointCloud {
+        points: vertices.iter().map(|vertex| vertex.position).collect(),
+        colors: colored.then(|| vertices.iter().map(|vertex| vertex.color).collect()),
+        visible: has_bytes("visible")
+            .then(|| vertices.iter().map(|vertex| vertex.visible).collect()),
+    })
 }
 
 /// Writes binary PLY: x, y, z, then red, green, blue and visible (0 or 1) where known.
@@ -66,8 +98,8 @@ pub fn write_points(path: &Path, cloud: &PointCloud) -> Result<()> {
 
     let vertices = cloud.points.iter().enumerate().map(|(idx, point)| Vertex {
         position: *point,
-        color: cloud.colors.as_ref().and_then(|all| all.get(idx).copied()).unwrap_or_default(),
-        visible: cloud.visible.as_ref().and_then(|all| all.get(idx).copied()).unwrap_or_default(),
+        color: cloud.color(idx),
+        visible: cloud.is_visible(idx),
     });
     let mut ply = Ply::<Vertex>::new();
     ply.header.encoding = Encoding::BinaryLittleEndian;
@@ -109,6 +141,17 @@ impl PropertyAccess for Vertex {
         self.set(name, value as f32)
     }
 
+    fn set_uchar(&mut self, name: &str, value: u8) -> PropertyAccessResult {
+        match name {
+            "red" => self.color[0] = value,
+            "green" => self.color[1] = value,
+            "blue" => self.color[2] = value,
+            "visible" => self.visible = value != 0,
+            _ => return PropertyAccessResult::Ignored,
+        }
+        PropertyAccessResult::Set
+    }
+
     fn get_float(&self, name: &str) -> Option<f32> {
         ["x", "y", "z"].iter().position(|axis| *axis == name).map(|axis| self.position[axis])
     }
@@ -138,13 +181,13 @@ mod tests {
     }
 
     #[test]
-    fn points_round_trip() {
+    fn clouds_round_trip() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("points.ply");
         let bare = PointCloud { colors: None, visible: None, ..cloud() };
         for cloud in [cloud(), bare] {
             write_points(&path, &cloud).expect("it is writable");
-            assert_eq!(read_points(&path).expect("it is a cloud"), cloud.points);
+            assert_eq!(read_cloud(&path).expect("it is a cloud"), cloud);
         }
     }
 

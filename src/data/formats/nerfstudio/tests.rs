@@ -1,16 +1,28 @@
 use image::{Luma, Rgb, RgbImage, RgbaImage};
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use super::*;
-use crate::data::{ColorImage, ScalarImage, sequence::Frame, viewpoint::look_at};
+use crate::{
+    camera::Intrinsics,
+    data::{
+        ColorImage, ScalarImage,
+        sequence::{Frame, Truth},
+        viewpoint::look_at,
+    },
+};
 
 /// What is wrong with a description.
 type Edit = fn(&mut Value);
 
 fn temporary() -> TempDir {
     tempfile::tempdir().expect("a temporary folder")
+}
+
+fn read_sequence(folder: &Path) -> Result<Sequence> {
+    let path = folder.join(TRANSFORMS);
+    Ok(list(&path, &SequenceHints::default())?.load(&path)?.0)
 }
 
 /// Two 4 × 3 frames with a pose each.
@@ -105,16 +117,17 @@ fn nerf_s_own_layout_is_read() {
 
 #[test]
 fn broken_descriptions_are_refused() {
-    let edits: [(Edit, &str); 12] = [
+    let edits: [(Edit, &str); 13] = [
         (|json| json["frames"] = json!([]), "no frames"),
         (|json| json["frames"] = json!("none"), "invalid type"),
         (|json| json["fl_x"] = json!(0.0), "not positive"),
         (|json| json["fl_x"] = json!(-5.0), "not positive"),
         (|json| json["fl_x"] = Value::Null, "no fl_x"),
-        (|json| json["k1"] = json!(0.01), "distortion"),
+        (|json| json["k4"] = json!(0.01), "k4"),
         (|json| json["camera_model"] = json!("OPENCV_FISHEYE"), "OPENCV_FISHEYE"),
-        (|json| json["frames"][1]["fl_x"] = json!(9.0), "own intrinsics"),
-        (|json| json["w"] = json!(5), "w × h"),
+        (|json| json["is_fisheye"] = json!(true), "fisheye"),
+        (|json| json["frames"][1]["fl_x"] = json!(0.0), "frame 1: its focal lengths"),
+        (|json| json["frames"][1]["camera_model"] = json!("FOV"), "frame 1: camera model FOV"),
         (|json| json["frames"][1]["transform_matrix"] = Value::Null, "some have none"),
         (|json| json["frames"][1]["transform_matrix"][0][3] = Value::Null, "null"),
         (
@@ -130,6 +143,23 @@ fn broken_descriptions_are_refused() {
     for (edit, reason) in edits {
         check_refused(&written(edit), TRANSFORMS, reason);
     }
+}
+
+#[test]
+fn a_frame_of_another_camera_is_brought_to_the_first_one_s() {
+    let plain = read_sequence(written(|_| ()).path()).expect("it is usable");
+    // Half the focal length about the same point: each of our pixels is two of the first frame's.
+    let folder = written(|json| {
+        json["frames"][1]["fl_x"] = json!(2.75);
+        json["frames"][1]["fl_y"] = json!(3.25);
+    });
+    let mixed = read_sequence(folder.path()).expect("it is usable");
+    assert_eq!(mixed.intrinsics, plain.intrinsics);
+    assert_eq!(mixed.frames[0].color, plain.frames[0].color);
+    // The principal point, (2.25, 1.5), stays; a pixel to the right of it is half of one there.
+    let value = mixed.frames[1].color.get_pixel(3, 1).0[0];
+    let there: f32 = 2.25 + (3.5 - 2.25) / 2.0;
+    assert!((value - (there - 0.5 + 1.0) / 5.0).abs() < 2e-3, "{value}");
 }
 
 #[test]
@@ -151,9 +181,12 @@ fn broken_pictures_are_refused() {
     mask_to_luma8(&ScalarImage::from_pixel(8, 6, Luma([1.0])))
         .save(folder.path().join("masks/frame_001.png"))
         .expect("it is writable");
-    check_refused(&folder, TRANSFORMS, "frame_001.png is [8, 6]");
+    check_refused(&folder, "images/frame_001.png", "it is [8, 6] pixels");
+    let folder = written(|json| json["w"] = json!(5));
+    check_refused(&folder, "images/frame_000.png", "its camera takes [5, 3]");
 
     let folder = written(|json| json["frames"][0]["mask_path"] = Value::Null);
+    fs::remove_dir_all(folder.path().join("masks")).expect("it is there");
     check_refused(&folder, "images/frame_000", "neither");
 }
 
@@ -167,15 +200,27 @@ fn a_missing_folder_and_broken_json_are_errors_by_name() {
 }
 
 #[test]
-fn estimated_poses_read_back() {
+fn masks_of_the_same_name_need_no_mask_path() {
+    let folder = written(|json| json["frames"][0]["mask_path"] = Value::Null);
+    let sequence = read_sequence(folder.path()).expect("it is usable");
+    assert_eq!(sequence.frames[0].mask, sequence.frames[1].mask);
+}
+
+#[test]
+fn trajectories_read_back() {
     let folder = written(|_| ());
     let Sequence { intrinsics, size, truth, .. } = sequence();
-    let poses = truth.expect("it has poses").camera_from_world;
-    let paths = [0, 1].map(|idx| PathBuf::from(format!("images/frame_{idx:03}.png")));
+    let camera_from_world = truth.expect("it has poses").camera_from_world;
+    let pictures = vec!["images/a.png".into(), "images/b.png".into()];
+    let written = Trajectory { intrinsics, size, camera_from_world, pictures, canonical: true };
     let path = folder.path().join("estimate.json");
-    write_transforms(&path, &intrinsics, size, &poses, &paths, true).expect("it is writable");
-    let text = fs::read_to_string(path).expect("it is there");
-    let transforms: Transforms = serde_json::from_str(&text).expect("it is JSON");
-    let read = transforms.poses().expect("they are rigid").expect("there are some");
-    assert!((read[1].to_homogeneous() - poses[1].to_homogeneous()).amax() < 1e-5);
+    write_trajectory(&path, &written).expect("it is writable");
+    let read = read_trajectory(&path).expect("it is usable");
+    let matrices = |trajectory: &Trajectory| -> Vec<_> {
+        trajectory.camera_from_world.iter().map(Isometry3::to_homogeneous).collect()
+    };
+    let differences = matrices(&read).into_iter().zip(matrices(&written)).map(|(a, b)| a - b);
+    assert!(differences.clone().all(|difference| difference.amax() < 1e-6));
+    let without_poses = |trajectory| Trajectory { camera_from_world: vec![], ..trajectory };
+    assert_eq!(without_poses(read), without_poses(written));
 }

@@ -10,29 +10,23 @@ use crate::{
     camera::Intrinsics,
     data::formats::{
         axes::{self, TransformMatrix},
+        calibration::{Calibration, Distortion},
         write_atomically,
     },
 };
 
 /// The `world` whose axes are those of the shape prior.
 const CANONICAL: &str = "canonical";
-/// Camera models that are pinholes, given that their distortion is zero.
-const PINHOLES: [&str; 5] = ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "SIMPLE_RADIAL", "RADIAL"];
+/// Camera models whose coefficients [`Distortion`] knows.
+const MODELS: [&str; 6] =
+    ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV"];
 
 /// The file. Lengths are in pixels, and angles in radians.
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Transforms {
-    #[serde(skip_serializing_if = "Option::is_none")]
-    camera_model: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    camera_angle_x: Option<f64>,
     #[serde(flatten)]
     lens: Lens,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    w: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    h: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     world: Option<String>,
     pub frames: Vec<FrameEntry>,
@@ -42,19 +36,25 @@ pub struct Transforms {
 pub struct FrameEntry {
     /// Relative to the folder.
     pub file_path: PathBuf,
-    /// Relative to the folder; without it, the picture's alpha channel is the mask.
+    /// Relative to the folder; without it, a mask of the same name or the alpha channel is the mask.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mask_path: Option<PathBuf>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub transform_matrix: Option<TransformMatrix>,
+    transform_matrix: Option<TransformMatrix>,
     #[serde(flatten)]
     lens: Lens,
 }
 
-/// Focal lengths, principal point and distortion: of all frames or, not supported, of one.
-#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+/// A camera: of all frames or, where a frame says otherwise, of one.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
-struct Lens {
+pub struct Lens {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    camera_model: Option<String>,
+    #[serde(skip_serializing)]
+    is_fisheye: Option<bool>,
+    #[serde(skip_serializing)]
+    camera_angle_x: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     fl_x: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -63,18 +63,22 @@ struct Lens {
     cx: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     cy: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    w: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    h: Option<f64>,
     #[serde(skip_serializing)]
-    k1: f64,
+    k1: Option<f64>,
     #[serde(skip_serializing)]
-    k2: f64,
+    k2: Option<f64>,
     #[serde(skip_serializing)]
-    k3: f64,
+    k3: Option<f64>,
     #[serde(skip_serializing)]
-    k4: f64,
+    k4: Option<f64>,
     #[serde(skip_serializing)]
-    p1: f64,
+    p1: Option<f64>,
     #[serde(skip_serializing)]
-    p2: f64,
+    p2: Option<f64>,
 }
 
 impl FrameEntry {
@@ -83,8 +87,12 @@ impl FrameEntry {
         mask_path: Option<PathBuf>,
         pose: Option<&Isometry3<f32>>,
     ) -> Self {
-        let transform_matrix = pose.map(axes::transform_matrix);
+        let transform_matrix = pose.map(axes::to_opengl_matrix);
         Self { file_path, mask_path, transform_matrix, lens: Lens::default() }
+    }
+
+    pub fn camera_from_world(&self) -> Result<Option<Isometry3<f32>>, String> {
+        self.transform_matrix.as_ref().map(axes::from_opengl_matrix).transpose()
     }
 }
 
@@ -98,15 +106,9 @@ impl Transforms {
         let [fl_x, fl_y, cx, cy] =
             [focal[0], focal[1], center[0], center[1]].map(|length| Some(f64::from(length)));
         let [w, h] = size.map(|side| Some(side as f64));
-        Self {
-            camera_model: Some("PINHOLE".into()),
-            lens: Lens { fl_x, fl_y, cx, cy, ..Lens::default() },
-            w,
-            h,
-            world: canonical.then(|| CANONICAL.into()),
-            frames,
-            ..Self::default()
-        }
+        let camera_model = Some("PINHOLE".into());
+        let lens = Lens { camera_model, fl_x, fl_y, cx, cy, w, h, ..Lens::default() };
+        Self { lens, world: canonical.then(|| CANONICAL.into()), frames }
     }
 
     pub fn write(&self, path: &Path) -> Result<()> {
@@ -120,86 +122,62 @@ impl Transforms {
         self.world.as_deref() == Some(CANONICAL)
     }
 
-    /// The reason, if this is not one pinhole camera's sequence.
-    pub fn check_supported(&self) -> Result<(), String> {
-        if self.frames.is_empty() {
-            return Err("it has no frames".into());
+    /// The camera of a frame: what it says itself, else what the file says of all.
+    pub fn lens(&self, entry: &FrameEntry) -> Lens {
+        let (own, all) = (entry.lens.clone(), self.lens.clone());
+        Lens {
+            camera_model: own.camera_model.or(all.camera_model),
+            is_fisheye: own.is_fisheye.or(all.is_fisheye),
+            camera_angle_x: own.camera_angle_x.or(all.camera_angle_x),
+            fl_x: own.fl_x.or(all.fl_x),
+            fl_y: own.fl_y.or(all.fl_y),
+            cx: own.cx.or(all.cx),
+            cy: own.cy.or(all.cy),
+            w: own.w.or(all.w),
+            h: own.h.or(all.h),
+            k1: own.k1.or(all.k1),
+            k2: own.k2.or(all.k2),
+            k3: own.k3.or(all.k3),
+            k4: own.k4.or(all.k4),
+            p1: own.p1.or(all.p1),
+            p2: own.p2.or(all.p2),
         }
-        if let Some(model) = self.camera_model.as_deref().filter(|model| !PINHOLES.contains(model))
-        {
+    }
+}
+
+impl Lens {
+    /// `[width, height]`, in pixels.
+    pub fn size(&self) -> Option<[usize; 2]> {
+        Some([self.w? as usize, self.h? as usize])
+    }
+
+    /// Missing lengths follow from others: `fl_x` from the angle of view, `fl_y` from `fl_x`, and the
+    /// principal point from the size.
+    pub fn calibration(&self, [width, height]: [usize; 2]) -> Result<Calibration, String> {
+        let from_angle = self.camera_angle_x.map(|angle| 0.5 * width as f64 / (0.5 * angle).tan());
+        let fl_x = self.fl_x.or(from_angle).ok_or("it has no fl_x and no camera_angle_x")?;
+        let focal = [fl_x, self.fl_y.unwrap_or(fl_x)];
+        let center =
+            [self.cx.unwrap_or(width as f64 / 2.0), self.cy.unwrap_or(height as f64 / 2.0)];
+        Calibration::new(focal, center, self.distortion()?)
+    }
+
+    fn distortion(&self) -> Result<Distortion, String> {
+        let unknown = |model: &&str| !MODELS.contains(model);
+        if let Some(model) = self.camera_model.as_deref().filter(unknown) {
             return Err(format!(
                 "camera model {model} is not supported; undistort it to a pinhole"
             ));
         }
-        let Lens { k1, k2, k3, k4, p1, p2, .. } = self.lens;
-        if [k1, k2, k3, k4, p1, p2].iter().any(|coefficient| *coefficient != 0.0) {
-            return Err("lens distortion (k1 to k4, p1, p2) is not supported; undistort it".into());
+        if self.is_fisheye == Some(true) {
+            return Err("fisheye lenses are not supported; undistort it to a pinhole".into());
         }
-        let own = |entry: &FrameEntry| entry.lens != Lens::default() && entry.lens != self.lens;
-        match self.frames.iter().position(own) {
-            Some(idx) => {
-                Err(format!("frame {idx} has its own intrinsics; one camera is supported"))
-            }
-            None => Ok(()),
+        let [k1, k2, k3, k4, p1, p2] =
+            [self.k1, self.k2, self.k3, self.k4, self.p1, self.p2].map(Option::unwrap_or_default);
+        if k4 != 0.0 {
+            // To OpenCV it stands below the fraction bar, to nerfstudio above it.
+            return Err("k4 means different lenses to different programs; undistort it".into());
         }
-    }
-
-    /// The one size that all pictures have, and that the file states if it states one.
-    pub fn common_size(
-        &self,
-        mut sizes: impl Iterator<Item = [usize; 2]>,
-    ) -> Result<[usize; 2], String> {
-        let first = sizes.next().ok_or("it has no frames")?;
-        let mut others = self.frames.iter().skip(1).zip(sizes);
-        if let Some((frame, size)) = others.find(|(_, size)| *size != first) {
-            let path = frame.file_path.display();
-            return Err(format!("{path} is {size:?} pixels, and the first frame {first:?}"));
-        }
-        let stated = [self.w, self.h];
-        let differs = |(stated, side): (Option<f64>, usize)| {
-            stated.is_some_and(|length| length != side as f64)
-        };
-        if stated.into_iter().zip(first).any(differs) {
-            return Err(format!("its pictures are {first:?} pixels, not w × h"));
-        }
-        Ok(first)
-    }
-
-    /// Missing ones follow from others: `fl_x` from the angle of view, `fl_y` from `fl_x`, and the
-    /// principal point from the size.
-    pub fn intrinsics(&self, [width, height]: [usize; 2]) -> Result<Intrinsics, String> {
-        let from_angle = self.camera_angle_x.map(|angle| 0.5 * width as f64 / (0.5 * angle).tan());
-        let fl_x = self.lens.fl_x.or(from_angle).ok_or("it has no fl_x and no camera_angle_x")?;
-        let focal = [fl_x, self.lens.fl_y.unwrap_or(fl_x)];
-        let center = [
-            self.lens.cx.unwrap_or(width as f64 / 2.0),
-            self.lens.cy.unwrap_or(height as f64 / 2.0),
-        ];
-        // Far beyond any lens, and well within single precision.
-        let possible = 1e-3..1e9;
-        if !focal.iter().all(|length| possible.contains(length)) {
-            return Err(format!("its focal lengths {focal:?} are not positive"));
-        }
-        if !center.iter().all(|coordinate| coordinate.abs() < possible.end) {
-            return Err(format!("its principal point {center:?} is not finite"));
-        }
-        let single = |lengths: [f64; 2]| lengths.map(|length| length as f32);
-        Ok(Intrinsics { focal: single(focal), center: single(center) })
-    }
-
-    /// `camera_from_world` of every frame, or of none.
-    pub fn poses(&self) -> Result<Option<Vec<Isometry3<f32>>>, String> {
-        let matrices: Vec<_> =
-            self.frames.iter().filter_map(|entry| entry.transform_matrix.as_ref()).collect();
-        if matrices.is_empty() {
-            return Ok(None);
-        }
-        if matrices.len() < self.frames.len() {
-            return Err("some frames have a transform_matrix and some have none".into());
-        }
-        let poses = matrices.into_iter().enumerate().map(|(idx, matrix)| {
-            axes::camera_from_world(matrix).map_err(|reason| format!("frame {idx}: {reason}"))
-        });
-        poses.collect::<Result<_, _>>().map(Some)
+        Ok(Distortion { radial: [k1, k2, k3], tangential: [p1, p2], ..Distortion::default() })
     }
 }
