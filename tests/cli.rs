@@ -225,22 +225,23 @@ fn axes_that_are_parallel_are_refused() {
 fn rendering_skips_and_lists_what_cannot_be_read() {
     let meshes = boxes(2);
     fs::write(meshes.path().join("broken.obj"), BROKEN).unwrap();
-    let out = TempDir::new().unwrap();
     let config = meshes.path().join("short.toml");
     fs::write(&config, "n_frames = 2\n").unwrap();
-    let render = |include: &str| {
+    let render = |out: &TempDir, include: &str| {
         let [folder, out, config] =
             [meshes.path(), out.path(), &config].map(|path| path.to_str().unwrap());
         let arguments = ["render", "--meshes", folder, "--out", out, "--config", config];
         pba_train(&[&arguments[..], &["--include", include]].concat())
     };
-    let output = render("*");
+    let out = TempDir::new().unwrap();
+    let output = render(&out, "*");
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{message}");
     assert!(message.contains("skipped: ") && message.contains("broken.obj"), "{message}");
     assert!(out.path().join("box_00-0/transforms.json").is_file());
     assert!(out.path().join("box_01-0/transforms.json").is_file());
-    check_refused(&render("broken"), &["broken.obj", "line 4"]);
+    let other = TempDir::new().unwrap();
+    check_refused(&render(&other, "broken"), &["broken.obj", "line 4"]);
 }
 
 /// A run that trains for one step on `meshes`, with many points to sample.

@@ -35,10 +35,10 @@ fn visible_points_are_those_that_the_mesh_does_not_hide() {
 
 #[test]
 fn sparse_clouds_show_little_of_their_hidden_side() {
-    for n_points in [6144, 2048] {
+    for (n_points, least) in [(6144, [0.9, 0.8]), (2048, [0.8, 0.75])] {
         let (precision, recall) = precision_and_recall(n_points, &PseudoRenderConfig::default());
-        assert!(precision >= 0.9, "precision is {precision} at {n_points} points");
-        assert!(recall >= 0.75, "recall is {recall} at {n_points} points");
+        assert!(precision >= least[0], "precision is {precision} at {n_points} points");
+        assert!(recall >= least[1], "recall is {recall} at {n_points} points");
     }
 }
 

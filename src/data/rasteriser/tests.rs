@@ -10,9 +10,9 @@ use rand::Rng;
 
 use super::*;
 use crate::data::{
+    collection::{Collection, Selection},
     keyed_rng,
     lighting::Ground,
-    shapenet::{CARS, find_models},
     viewpoint::look_at,
 };
 
@@ -48,7 +48,7 @@ fn random_mesh(seed: u64, n_triangles: u32) -> Mesh {
 
 fn real_car() -> Mesh {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/shapenet_v2");
-    let models = find_models(&fixtures, CARS).expect("the fixture");
+    let models = Collection::open(&fixtures, &Selection::default()).expect("the fixture").models;
     models[0].load().expect("a car").mesh
 }
 

@@ -7,7 +7,7 @@ use nalgebra::{Unit, Vector3};
 
 use super::{real_car, render};
 use crate::data::{
-    formats::nerfstudio::read_sequence,
+    formats::{SequenceHints, read_sequence},
     lighting::{Light, Place, Scene},
 };
 
@@ -17,7 +17,8 @@ const SUN: [f32; 3] = [0.4, 0.8, -0.45];
 #[test]
 fn blender_sees_the_same_silhouettes_and_colours() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/blender");
-    let sequence = read_sequence(&folder).expect("the fixture");
+    let reading = read_sequence(&folder, &SequenceHints::default()).expect("the fixture");
+    let sequence = reading.sequence;
     let poses = sequence.truth.expect("Blender knows its cameras").camera_from_world;
     let sun = Place::Direction(Unit::new_normalize(Vector3::from(SUN)));
     let scene = Scene {
