@@ -44,15 +44,14 @@ fn config(solver: Solver) -> BundleAdjustmentConfig {
     }
 }
 
-/// When this was written, 17 of 20 came under a degree, 0.7° in the mean; the others ended at 1.1° to
-/// 1.4°, where more iterations leave them: colours outweigh the silhouette there.
 #[test]
-fn levenberg_marquardt_recovers_most_to_under_a_degree() {
-    let errors = remaining_errors(N_SEQUENCES, 24_576, Solver::Lm);
+fn levenberg_marquardt_recovers_nine_in_ten_to_under_a_degree() {
+    let errors = remaining_errors(N_SEQUENCES, 12_288, Solver::Lm);
     let n_recovered = errors.iter().filter(|&&error| error < 1.0).count();
     let mean = errors.iter().sum::<f32>() / errors.len() as f32;
-    assert!(10 * n_recovered >= 8 * errors.len(), "{errors:.2?}");
-    assert!(mean < 0.8 && errors.iter().all(|&error| error < 2.0), "{errors:.2?}");
+    println!("{n_recovered} of {} under a degree, mean {mean:.2}: {errors:.2?}", errors.len());
+    assert!(10 * n_recovered >= 9 * errors.len(), "{errors:.2?}");
+    assert!(errors.iter().all(|&error| error < 2.0), "{errors:.2?}");
 }
 
 #[test]

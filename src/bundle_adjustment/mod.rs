@@ -44,7 +44,8 @@ pub struct BundleAdjustmentConfig {
     pub solver: Solver,
     /// Blur of the frames at each level, coarse to fine: a Gaussian's standard deviation in pixels.
     pub blurs: Vec<f32>,
-    /// Initial poses that are tried at the first level; the one with the least objective goes on.
+    /// Initial poses that are tried; the one that ends with the least objective is kept. Front and back
+    /// look alike until the frames are sharp.
     pub n_hypotheses: usize,
     pub objective: ObjectiveConfig,
     pub adam: AdamConfig,
@@ -82,7 +83,7 @@ impl BundleAdjustmentConfig {
             Solver::Lm => self.lm.iterations + 1,
             Solver::AlternatingLbfgs => 3 * self.alternating.max_rounds + 1,
         };
-        per_level * (self.n_hypotheses.max(1) + self.blurs.len() - 1)
+        per_level * self.n_hypotheses.max(1) * self.blurs.len()
     }
 
     /// Algorithm 1 on Eq. 6, as the paper prints them.
@@ -183,36 +184,18 @@ pub fn bundle_adjust(
     };
     let mut progress =
         Progress { observe, stages: Vec::new(), iteration: 0, hypothesis: 0, blur: 0.0 };
-    progress.end_stage("initial", &hypotheses[0]);
-
     let hypotheses = &hypotheses[..hypotheses.len().min(config.n_hypotheses.max(1))];
-    let mut runs: Vec<Run> = hypotheses.iter().map(Run::new).collect();
-    for (idx, run) in runs.iter_mut().enumerate() {
+    let finished = hypotheses.iter().enumerate().map(|(idx, hypothesis)| {
         progress.hypothesis = idx;
-        run.advance(&objective, 0, config, &mut progress);
-    }
-    let cost = |run: &Run| objective.evaluate(&run.unknowns, 0).objective;
-    let costs: Vec<f64> = runs.iter().map(cost).collect();
-    let best =
-        (0..runs.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).expect("a hypothesis");
-    let mut run = runs.swap_remove(best);
-    progress.hypothesis = best;
-    progress.stages.retain(|(name, _)| name == "initial" || runs.is_empty());
-    if !runs.is_empty() {
-        progress.end_stage(&format!("blur {}", config.blurs[0]), &run.unknowns);
-    }
-    for level in 1..config.blurs.len() {
-        if run.status == Status::NotFinite {
-            break;
-        }
-        run.advance(&objective, level, config, &mut progress);
-    }
-    Outcome {
-        unknowns: run.unknowns,
-        status: run.status,
-        iterations: progress.iteration,
-        stages: progress.stages,
-    }
+        progress.end_stage("initial", &hypotheses[0]);
+        let run = Run::new(hypothesis).through_all_levels(&objective, config, &mut progress);
+        let cost = objective.value(&run.unknowns, config.blurs.len() - 1).objective;
+        (cost, run, std::mem::take(&mut progress.stages))
+    });
+    // NaN is the greatest.
+    let best = finished.min_by(|a, b| a.0.total_cmp(&b.0));
+    let (_, run, stages) = best.expect("there is a hypothesis");
+    Outcome { unknowns: run.unknowns, status: run.status, iterations: progress.iteration, stages }
 }
 
 /// One hypothesis on its way.
@@ -226,6 +209,21 @@ impl Run {
     fn new(initial: &Unknowns) -> Self {
         let (unknowns, adam) = (initial.clone(), Adam::new(initial));
         Self { unknowns, adam, status: Status::BudgetSpent }
+    }
+
+    fn through_all_levels(
+        mut self,
+        objective: &Objective,
+        config: &BundleAdjustmentConfig,
+        progress: &mut Progress,
+    ) -> Self {
+        for level in 0..config.blurs.len() {
+            self.advance(objective, level, config, progress);
+            if self.status == Status::NotFinite {
+                break;
+            }
+        }
+        self
     }
 
     fn advance(

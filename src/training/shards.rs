@@ -132,13 +132,13 @@ mod tests {
     use std::path::PathBuf;
 
     fn config() -> TrainingConfig {
-        let mut config = TrainingConfig::default();
-        config.data = DataConfig {
+        let data = DataConfig {
             n_models: 5,
             views_per_model: 2,
             paints_per_model: 2,
             ..DataConfig::default()
         };
+        let mut config = TrainingConfig { data, ..TrainingConfig::default() };
         config.regressors.network.crop_size = 16;
         config
     }

@@ -125,8 +125,8 @@ impl Face {
         let mut row = Row { slopes: [0.0; 4], starts: [[0.0; N]; 4] };
         for (i, function) in [a, b, c, &self.inverse_depth].into_iter().enumerate() {
             row.slopes[i] = function.x;
-            for k in 0..N {
-                row.starts[i][k] = function.y * (y + OFFSETS[1][k]) + function.z;
+            for (start, offset) in row.starts[i].iter_mut().zip(OFFSETS[1]) {
+                *start = function.y * (y + offset) + function.z;
             }
         }
         row

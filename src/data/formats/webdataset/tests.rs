@@ -95,7 +95,7 @@ fn gaps_overlaps_and_foreign_shards_are_refused() {
     let early = write(&folder, "early", "cars", 2..6);
     let foreign = write(&folder, "foreign", "planes", 3..6);
     check_refused(&[], "no shards");
-    check_refused(&[a.clone()], "samples 3 to 5 are missing");
+    check_refused(std::slice::from_ref(&a), "samples 3 to 5 are missing");
     check_refused(&[b], "samples 0 to 2 are missing");
     check_refused(&[a.clone(), late], "samples 3 to 3 are missing");
     check_refused(&[a.clone(), early], "in another shard as well");
@@ -112,14 +112,14 @@ fn broken_shards_are_refused() {
     let mut flipped = bytes.clone();
     flipped[512 + 40] ^= 1;
     fs::write(&whole, flipped).expect("writable");
-    check_refused(&[whole.clone()], "manifest");
+    check_refused(std::slice::from_ref(&whole), "manifest");
     fs::write(&whole, &bytes[..bytes.len() / 2 / 512 * 512]).expect("writable");
-    check_refused(&[whole.clone()], "whole.tar");
+    check_refused(std::slice::from_ref(&whole), "whole.tar");
     fs::write(&whole, &bytes[3 * 1024..]).expect("writable");
-    check_refused(&[whole.clone()], "not in its place");
+    check_refused(std::slice::from_ref(&whole), "not in its place");
 
     fs::write(whole.with_extension("json"), "{").expect("writable");
-    check_refused(&[whole.clone()], "whole.json");
+    check_refused(std::slice::from_ref(&whole), "whole.json");
     fs::remove_file(whole.with_extension("json")).expect("it is there");
     check_refused(&[whole], "unfinished");
 }
