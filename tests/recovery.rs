@@ -46,7 +46,7 @@ fn config(solver: Solver) -> BundleAdjustmentConfig {
 
 #[test]
 fn levenberg_marquardt_recovers_nine_in_ten_to_under_a_degree() {
-    let errors = remaining_errors(N_SEQUENCES, 12_288, Solver::Lm);
+    let errors = remaining_errors(N_SEQUENCES, 24_576, Solver::Lm);
     let n_recovered = errors.iter().filter(|&&error| error < 1.0).count();
     let mean = errors.iter().sum::<f32>() / errors.len() as f32;
     println!("{n_recovered} of {} under a degree, mean {mean:.2}: {errors:.2?}", errors.len());

@@ -52,6 +52,8 @@ pub struct PseudoRenderConfig {
 }
 
 impl Default for PseudoRenderConfig {
+    /// Against the true visibility of 6 procedural cars in 18 views of 128 × 128 (precision, recall):
+    /// 0.96, 0.91 at N = 24,576; 0.90, 0.90 at 6,144; 0.83, 0.87 at 2,048 (`tests/visibility.rs`).
     fn default() -> Self {
         Self {
             footprint: Footprint::Disc,
