@@ -12,7 +12,7 @@ use super::{Trajectory, ply::PointCloud, write_atomically};
 use crate::{Error, Result};
 
 /// Writes `camera_from_world` [L, 4, 4], `intrinsics` K [3, 3], `size` (width, height), `points` [N, 3]
-/// and, where known, `colors` [N, 3] and `visible` [N]. Camera axes are OpenCV's.
+/// and, where known, `colors` `[N, 3]` and `visible` `[N]`. Camera axes are OpenCV's.
 pub fn write(path: &Path, trajectory: &Trajectory, cloud: &PointCloud) -> Result<()> {
     let bytes = archive(trajectory, cloud).map_err(Error::io(path))?;
     write_atomically(path, &bytes)
