@@ -86,7 +86,7 @@ fn compare(
     free_config.objective.style_weight = 0.0;
     free_config.adam.style_rate = POINT_RATE;
     let arm = |shape: &dyn ShapeModel, unknowns: &Unknowns| Arm {
-        scores: score(sequence, shape, unknowns, &config.objective.pseudo_render, device),
+        scores: score(sequence, shape, unknowns, device),
         picture: picture(sequence, shape, unknowns, config, device),
     };
     let adjusted =

@@ -93,8 +93,7 @@ pub fn reconstruct_and_score(
     let seconds = start.elapsed().as_secs_f64();
 
     let generator = &prior.shape.generator;
-    let pseudo_render = &config.objective.pseudo_render;
-    let judge = |unknowns: &Unknowns| score(sequence, generator, unknowns, pseudo_render, &device);
+    let judge = |unknowns: &Unknowns| score(sequence, generator, unknowns, &device);
     let report = Report {
         initial: judge(&outcome.stages[0].1),
         last: judge(&outcome.unknowns),

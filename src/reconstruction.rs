@@ -88,18 +88,20 @@ pub struct Scores {
     pub silhouette_loss: f64,
 }
 
-/// Judges a state by the bare Eq. 3, 5 and 7, whatever the solver minimised.
+/// Judges a state by the bare Eq. 3, 5 and 7, on the points that the default pseudo-renderer sees,
+/// whatever the solver minimised and however it saw.
 pub fn score(
     sequence: &Sequence,
     shape: &dyn ShapeModel,
     unknowns: &Unknowns,
-    pseudo_render: &PseudoRenderConfig,
     device: &Device,
 ) -> Scores {
     let device = device.clone().inner();
     let observations = Observations::new(sequence, &[0.0], &device);
-    let config =
-        ObjectiveConfig { pseudo_render: pseudo_render.clone(), ..ObjectiveConfig::paper() };
+    let config = ObjectiveConfig {
+        pseudo_render: PseudoRenderConfig::default(),
+        ..ObjectiveConfig::paper()
+    };
     let objective =
         Objective { observations: &observations, shape, config: &config, device: device.clone() };
     let bare = objective.evaluate(unknowns, 0);
