@@ -52,7 +52,7 @@ impl Texture {
         };
         let coarsest = (self.levels.len() - 1) as f32;
         // log₂ of a length is half that of its square. A NaN, from a degenerate uv map, becomes 0.
-        let level = (squared(0).max(squared(1)).max(1.0).log2() / 2.0).min(coarsest);
+        let level = (rough_log2(squared(0).max(squared(1)).max(1.0)) / 2.0).min(coarsest);
 
         // A cast to few bits is the quickest.
         let fine = level as u8;
@@ -115,6 +115,13 @@ impl Level {
     }
 }
 
+/// log₂ of a positive number, straight between powers of two: at most 0.09 too low.
+fn rough_log2(x: f32) -> f32 {
+    // As an integer, a float is its exponent, then the mantissa's share of the way to the next.
+    const ONE: i32 = 1.0_f32.to_bits() as i32;
+    (x.to_bits() as i32 - ONE) as f32 / (1 << (f32::MANTISSA_DIGITS - 1)) as f32
+}
+
 /// What is left of a coordinate without its whole repeats: it keeps its precision however many.
 fn fraction(coordinate: f32) -> f32 {
     // A cast instead of floor(): baseline x86-64 has no instruction for it.
@@ -170,5 +177,14 @@ mod tests {
             Texture::new(&RgbImage::new(0, 4)).sample(Vector2::repeat(0.5), POINT),
             [1.0; 3]
         );
+    }
+    #[test]
+    fn the_rough_logarithm_is_exact_at_powers_of_two_and_close_between() {
+        for i in 0..100 {
+            let exponent = i as f32 / 8.0;
+            let error = exponent - rough_log2(exponent.exp2());
+            assert!((-1e-5..0.0861).contains(&error), "{exponent}: {error}");
+            assert!(i % 8 != 0 || error.abs() < 1e-5, "{exponent}: {error}");
+        }
     }
 }
