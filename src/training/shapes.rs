@@ -86,12 +86,15 @@ impl Shapes {
     pub fn mesh(&self, model_idx: usize, paint: usize) -> Result<Mesh> {
         match &self.source {
             Source::ProceduralCars => {
-                let car =
-                    CarParameters::random(&mut keyed_rng(self.seed, [SHAPE, model_idx as u64]));
+                let car = self.procedural_car(model_idx);
                 Ok(car.mesh(&mut keyed_rng(self.seed, [PAINT + paint as u64, model_idx as u64])))
             }
             Source::Meshes { models, .. } => Ok(models[model_idx].load()?.mesh),
         }
+    }
+
+    fn procedural_car(&self, model_idx: usize) -> CarParameters {
+        CarParameters::random(&mut keyed_rng(self.seed, [SHAPE, model_idx as u64]))
     }
 
     /// Each shape's own surface points.
@@ -100,7 +103,8 @@ impl Shapes {
             let points: Vec<Point3<f32>> = match &self.source {
                 Source::ProceduralCars => {
                     let mut rng = keyed_rng(self.seed, [SURFACE, model_idx as u64]);
-                    sample_surface(&self.mesh(model_idx, 0)?, n_points, &mut rng)
+                    let mesh = self.procedural_car(model_idx).unpainted_mesh();
+                    sample_surface(&mesh, n_points, &mut rng)
                 }
                 // Up to `points_per_model`, fewer points are the first of those that are kept.
                 Source::Meshes { models, sampler, n_points: n_kept } => {

@@ -52,14 +52,23 @@ impl CarParameters {
         let profile = Profile::new(self);
         let livery = Livery::random(paint_rng);
         let pictures = livery.pictures(&profile, paint_rng);
-
-        let mut mesh = Mesh { textures: pictures.to_images(), ..Mesh::default() };
-        for part in parts(&profile, &livery) {
-            add_part(&mut mesh, &part, &pictures);
-        }
-        mesh.normalise();
-        mesh
+        let mesh = assemble(&profile, &livery, Some(&pictures));
+        Mesh { textures: pictures.to_images(), ..mesh }
     }
+
+    /// The triangles of [`mesh`](Self::mesh) without its pictures, which take most of the time.
+    pub fn unpainted_mesh(&self) -> Mesh {
+        assemble(&Profile::new(self), &Livery::random(&mut keyed_rng(0, [0, 1])), None)
+    }
+}
+
+fn assemble(profile: &Profile, livery: &Livery, pictures: Option<&Pictures>) -> Mesh {
+    let mut mesh = Mesh::default();
+    for part in parts(profile, livery) {
+        add_part(&mut mesh, &part, livery, pictures);
+    }
+    mesh.normalise();
+    mesh
 }
 
 /// A closed surface in its own place, and how its faces are painted.
@@ -144,14 +153,15 @@ fn wheel_skin(wheel: &Solid, face: &Face) -> Skin {
     if normal.x > 0.3 { Skin::Picture(View::Wheel) } else { Skin::Plain(TYRE) }
 }
 
-fn add_part(mesh: &mut Mesh, part: &Part, pictures: &Pictures) {
+fn add_part(mesh: &mut Mesh, part: &Part, livery: &Livery, pictures: Option<&Pictures>) {
     let first = mesh.vertices.len() as u32;
     mesh.vertices.extend(part.solid.vertices.iter().map(|point| part.pose * point));
     mesh.triangles.extend(part.solid.faces.iter().zip(&part.skins).map(|(face, &skin)| {
         let vertices = face.vertices.map(|vertex| first + vertex);
-        match skin {
-            Skin::Plain(color) => Triangle { vertices, uvs: [[0.0; 2]; 3], color, texture: None },
-            Skin::Picture(view) => Triangle {
+        match (skin, pictures) {
+            (Skin::Plain(color), _) => Triangle::plain(vertices, color),
+            (Skin::Picture(_), None) => Triangle::plain(vertices, livery.paint),
+            (Skin::Picture(view), Some(pictures)) => Triangle {
                 vertices,
                 uvs: part.solid.corners(face).map(|corner| pictures.uv(view, corner)),
                 color: [1.0; 3],

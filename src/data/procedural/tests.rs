@@ -50,6 +50,12 @@ fn one_shape_wears_many_paints() {
     let [one, other] = [1, 2].map(|paint| shape.mesh(&mut keyed_rng(7, [0, paint])));
     assert_eq!(one.vertices, other.vertices);
     assert_ne!(one.textures, other.textures);
+
+    let unpainted = shape.unpainted_mesh();
+    assert_eq!(unpainted.vertices, one.vertices);
+    let triangles = |mesh: &Mesh| -> Vec<_> { mesh.triangles.iter().map(|t| t.vertices).collect() };
+    assert_eq!(triangles(&unpainted), triangles(&one));
+    assert!(unpainted.textures.is_empty());
 }
 
 #[test]
