@@ -1,7 +1,7 @@
 //! From a cloud to its latent.
 
 use burn::{
-    module::Module,
+    module::{Module, Param},
     nn::{BatchNorm, BatchNormConfig, Linear},
     tensor::{Device, Tensor, activation::relu},
 };
@@ -35,6 +35,21 @@ impl PointEncoder {
             output: rectified_linear(c, k, device),
             // Without weights, so that no direction of the latent can fade away.
             latent_norm: BatchNormConfig::new(k).init(device).no_grad(),
+        }
+    }
+
+    /// The same encoder, also on a device that trains, with the statistics that it has gathered.
+    ///
+    /// Those of a batch make a shape's latent depend on the shapes beside it: a noise that keeps
+    /// the generator from becoming exact.
+    pub fn with_running_statistics(&self) -> Self {
+        let settled =
+            |norm: &BatchNorm| BatchNorm { training: Param::from_bool(false), ..norm.clone() };
+        Self {
+            pooled_norm: settled(&self.pooled_norm),
+            hidden_norm: settled(&self.hidden_norm),
+            latent_norm: settled(&self.latent_norm),
+            ..self.clone()
         }
     }
 

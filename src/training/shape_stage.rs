@@ -116,7 +116,11 @@ impl<'a> ShapeStage<'a> {
                 (target[..network.n_encoder_points].to_vec(), target)
             })
             .unzip();
-        let latent = prior.encode(cloud_tensor(&seen, device));
+        let seen = cloud_tensor(&seen, device);
+        let latent = match step < schedule.share(self.config.prior.batch_statistics) {
+            true => prior.encoder.forward(seen),
+            false => prior.encoder.with_running_statistics().forward(seen),
+        };
         let clouds = prior.generator.forward(latent);
         let n_queries = self.config.prior.chamfer_queries;
         vec![("chamfer", sampled_chamfer(clouds, &targets, n_queries, &mut rng) * SCALE)]
