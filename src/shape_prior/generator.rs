@@ -28,8 +28,11 @@ pub struct Generator {
     /// Lets neighbouring cells of the grid agree on their border, before the last doubling.
     refine: Conv,
     grid_output: Linear,
+    /// `[rows, columns, channels]` of the coarsest grid.
     #[module(skip)]
-    grid_channels: usize,
+    coarsest: [usize; 3],
+    #[module(skip)]
+    symmetric: bool,
 }
 
 impl Generator {
@@ -50,18 +53,21 @@ impl Generator {
             .collect();
         let upsamples = channels.windows(2).map(|c| Upsample::new([c[0], c[1]], device)).collect();
         let penultimate = channels[channels.len().saturating_sub(2)];
-        let coarsest = COARSEST_SIDE * COARSEST_SIDE * channels[0];
+        let columns = if config.symmetric { COARSEST_SIDE / 2 } else { COARSEST_SIDE };
+        let coarsest = [COARSEST_SIDE, columns, channels[0]];
+        let (n_coarsest, n_fc) = (coarsest.iter().product(), config.n_fc_points / config.copies());
         Self {
             whitening,
             template: template_param(template, config, device),
             fc: [(k, HIDDEN), (HIDDEN, config.fc_width)]
                 .map(|(i, o)| rectified_linear(i, o, device)),
-            fc_output: output_layer(config.fc_width, 3 * config.n_fc_points, device),
-            grid: [(k, HIDDEN), (HIDDEN, coarsest)].map(|(i, o)| rectified_linear(i, o, device)),
+            fc_output: output_layer(config.fc_width, 3 * n_fc, device),
+            grid: [(k, HIDDEN), (HIDDEN, n_coarsest)].map(|(i, o)| rectified_linear(i, o, device)),
             upsamples,
             refine: ConvConfig::same([penultimate, penultimate]).init(device),
             grid_output: output_layer(channels[channels.len() - 1], 3, device),
-            grid_channels: channels[0],
+            coarsest,
+            symmetric: config.symmetric,
         }
     }
 
@@ -71,7 +77,7 @@ impl Generator {
     }
 
     pub fn n_points(&self) -> usize {
-        self.template.dims()[0]
+        self.template.dims()[0] * if self.symmetric { 2 } else { 1 }
     }
 
     /// Standard deviation of the latent along each style direction, `[k]`, largest first.
@@ -84,7 +90,8 @@ impl Generator {
         let latent = self.whitening.latent_from_style(style);
         let offsets =
             Tensor::cat(vec![self.fc_branch(latent.clone()), self.grid_branch(latent)], 1);
-        self.template.val().unsqueeze() + offsets
+        let points = self.template.val().unsqueeze() + offsets;
+        if self.symmetric { with_mirror_image(points) } else { points }
     }
 
     fn fc_branch(&self, latent: Tensor<2>) -> Tensor<3> {
@@ -98,7 +105,8 @@ impl Generator {
         let [b, _] = latent.dims();
         let [first, second] = &self.grid;
         let coarsest = relu(second.forward(relu(first.forward(latent))));
-        let mut grid = coarsest.reshape([b, COARSEST_SIDE, COARSEST_SIDE, self.grid_channels]);
+        let [rows, columns, channels] = self.coarsest;
+        let mut grid = coarsest.reshape([b, rows, columns, channels]);
         for (i, upsample) in self.upsamples.iter().enumerate() {
             if i + 1 == self.upsamples.len() {
                 grid = relu(self.refine.forward(grid));
@@ -115,38 +123,55 @@ fn output_layer(d_input: usize, d_output: usize, device: &Device) -> Linear {
     LinearConfig::new(d_input, d_output).with_bias(false).with_initializer(initializer).init(device)
 }
 
+/// `[b, n, 3]` to `[b, 2n, 3]`: the points, then what they are in the mirror.
+fn with_mirror_image(points: Tensor<3>) -> Tensor<3> {
+    let mirror = Tensor::<1>::from_floats([-1.0, 1.0, 1.0], &points.device()).unsqueeze();
+    Tensor::cat(vec![points.clone(), points * mirror], 1)
+}
+
 fn template_param(
     points: &[[f32; 3]],
     config: &ShapePriorConfig,
     device: &Device,
 ) -> Param<Tensor<2>> {
-    let (fc, grid) = points.split_at(config.n_fc_points);
-    let mut ordered = fc.to_vec();
-    ordered.resize(config.n_points(), [0.0; 3]);
-    let cells = &mut ordered[config.n_fc_points..];
-    lay_out(&mut grid.to_vec(), cells, config.grid_side, [0, 0], config.grid_side);
-    Param::from_data(TensorData::new(ordered.concat(), [config.n_points(), 3]), device)
+    // Mirrored points are left out; which side those that remain lie on does not matter to the loss,
+    // but that neighbours lie on one side does.
+    let n = config.n_points() / config.copies();
+    let on_one_side =
+        |&[x, y, z]: &[f32; 3]| if config.symmetric { [x.abs(), y, z] } else { [x, y, z] };
+    let points: Vec<_> = points[..n].iter().map(on_one_side).collect();
+
+    let (fc, grid) = points.split_at(config.n_fc_points / config.copies());
+    let mut ordered = points.clone();
+    let cells = &mut ordered[fc.len()..];
+    lay_out(&mut grid.to_vec(), cells, [config.grid_side, config.grid_side / config.copies()]);
+    Param::from_data(TensorData::new(ordered.concat(), [n, 3]), device)
 }
 
-/// Lays points out on a square of the grid so that neighbours in space are neighbours on it, as
-/// the deconvolutions assume: each half of the square takes a half of the points along the axis
-/// of their greatest extent.
-fn lay_out(
+/// Lays points out on the rows of a grid so that neighbours in space are neighbours on it, as the
+/// deconvolutions assume: each half of the grid takes a half of the points along the axis of their
+/// greatest extent.
+fn lay_out(points: &mut [[f32; 3]], cells: &mut [[f32; 3]], [rows, columns]: [usize; 2]) {
+    let mut place = |[row, column]: [usize; 2], point| cells[row * columns + column] = point;
+    spread(points, [0, 0], [rows, columns], &mut place);
+}
+
+fn spread(
     points: &mut [[f32; 3]],
-    cells: &mut [[f32; 3]],
-    stride: usize,
     [row, column]: [usize; 2],
-    side: usize,
+    [rows, columns]: [usize; 2],
+    place: &mut impl FnMut([usize; 2], [f32; 3]),
 ) {
-    if side == 1 {
-        cells[row * stride + column] = points[0];
-        return;
+    if let [point] = points {
+        return place([row, column], *point);
     }
-    let half = side / 2;
-    for (i, rows) in halves(points).into_iter().enumerate() {
-        for (j, block) in halves(rows).into_iter().enumerate() {
-            lay_out(block, cells, stride, [row + i * half, column + j * half], half);
-        }
+    let [low, high] = halves(points);
+    if rows >= columns {
+        spread(low, [row, column], [rows / 2, columns], place);
+        spread(high, [row + rows / 2, column], [rows / 2, columns], place);
+    } else {
+        spread(low, [row, column], [rows, columns / 2], place);
+        spread(high, [row, column + columns / 2], [rows, columns / 2], place);
     }
 }
 
@@ -191,11 +216,27 @@ mod tests {
     }
 
     #[test]
+    fn symmetric_shapes_look_the_same_in_the_mirror() {
+        let device = Device::flex();
+        let config = ShapePriorConfig { symmetric: true, ..tiny() };
+        let prior = config.init(&scattered_points(config.n_points()), &device);
+        let style = Tensor::random([2, 6], burn::tensor::Distribution::Default, &device);
+        let points = prior.generator.forward(style);
+        assert_eq!(points.dims(), [2, config.n_points(), 3]);
+        assert_eq!(prior.generator.n_points(), config.n_points());
+
+        let half = config.n_points() / 2;
+        let [one, other] = [0..half, half..2 * half].map(|half| points.clone().slice([0..2, half]));
+        let mirrored = with_mirror_image(one).slice([0..2, half..2 * half]);
+        other.into_data().assert_eq(&mirrored.into_data(), true);
+    }
+
+    #[test]
     fn neighbours_on_the_grid_are_neighbours_in_space() {
         let side = 16;
         let points = scattered_points(side * side);
         let mut cells = vec![[0.0; 3]; side * side];
-        lay_out(&mut points.clone(), &mut cells, side, [0, 0], side);
+        lay_out(&mut points.clone(), &mut cells, [side, side]);
         let mean_step = |points: &[[f32; 3]]| {
             let steps = points
                 .windows(2)

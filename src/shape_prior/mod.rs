@@ -39,6 +39,9 @@ pub struct ShapePriorConfig {
     pub grid_side: usize,
     /// Channels of its 4 × 4 grid; every doubling of the side halves them, down to 16.
     pub grid_channels: usize,
+    /// Whether shapes look the same in the mirror, x ↦ −x. Either branch then has half of its points
+    /// to decode, and half of the grid's columns.
+    pub symmetric: bool,
 }
 
 impl Default for ShapePriorConfig {
@@ -51,6 +54,7 @@ impl Default for ShapePriorConfig {
             fc_width: 512,
             grid_side: 64,
             grid_channels: 128,
+            symmetric: false,
         }
     }
 }
@@ -59,6 +63,11 @@ impl ShapePriorConfig {
     /// N, the points of a generated cloud.
     pub fn n_points(&self) -> usize {
         self.n_fc_points + self.grid_side * self.grid_side
+    }
+
+    /// How often each decoded point appears in a cloud.
+    fn copies(&self) -> usize {
+        if self.symmetric { 2 } else { 1 }
     }
 
     /// Why no network has these sizes, if none has.
@@ -71,6 +80,9 @@ impl ShapePriorConfig {
         }
         if n_encoder_points > self.n_points() {
             return Err(format!("n_encoder_points must be at most {}", self.n_points()));
+        }
+        if self.symmetric && !self.n_fc_points.is_multiple_of(2) {
+            return Err("n_fc_points must be even where shapes are symmetric".into());
         }
         let doublings = self.grid_side / COARSEST_SIDE;
         if !self.grid_side.is_multiple_of(COARSEST_SIDE) || !doublings.is_power_of_two() {
@@ -139,6 +151,7 @@ pub(crate) mod tests {
             fc_width: 32,
             grid_side: 8,
             grid_channels: 16,
+            symmetric: false,
         }
     }
 

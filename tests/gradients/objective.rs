@@ -114,6 +114,7 @@ fn the_objective_of_poses_and_style() {
         fc_width: 16,
         grid_side: 4,
         grid_channels: 16,
+        symmetric: true,
     };
     let template: Vec<f32> = two_sheets().iter().map(|&x| x as f32).collect();
     DEVICE.seed(9);

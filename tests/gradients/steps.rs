@@ -138,6 +138,7 @@ fn distances_of_generated_points_to_a_cloud() {
         fc_width: 16,
         grid_side: 8,
         grid_channels: 16,
+        symmetric: true,
     };
     let template: Vec<[f32; 3]> = (0..config.n_points())
         .map(|i| [0.1, 0.23, 0.37].map(|step| (step * i as f32).sin() * 0.5))
