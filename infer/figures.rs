@@ -5,11 +5,16 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use burn::tensor::Device;
 use image::{Rgb, RgbImage, imageops};
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use object_pba::{
     bundle_adjustment::{BundleAdjustmentConfig, Outcome},
     checkpoint::Prior,
-    data::{ColorImage, crop::silhouette_box, sequence::Sequence},
+    data::{
+        ColorImage,
+        cloud_picture::{PAPER, draw_cloud, splat},
+        crop::silhouette_box,
+        sequence::Sequence,
+    },
     reconstruction::{Views, views},
     silhouette::MASK_THRESHOLD,
 };
@@ -22,7 +27,6 @@ const OVERLAY: Rgb<u8> = Rgb([60, 110, 255]);
 const PANEL: u32 = 240;
 /// Share of the object's extent that a panel shows around it.
 const MARGIN: f32 = 0.12;
-const PAPER: Rgb<u8> = Rgb([255; 3]);
 
 /// The square part of a frame that a panel shows, in pixels of the frame.
 #[derive(Clone, Copy)]
@@ -152,39 +156,9 @@ pub fn cloud_views(
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), degrees.to_radians());
         let mut pose = *reference;
         pose.rotation *= turn;
-        draw_cloud(&pose, points, colors)
+        draw_cloud(&pose, points, colors, PANEL)
     });
     side_by_side(&views)
-}
-
-/// Points as squares, nearer ones over farther ones and darker with distance.
-fn draw_cloud(
-    camera_from_world: &Isometry3<f32>,
-    points: &[[f32; 3]],
-    colors: &[[u8; 3]],
-) -> RgbImage {
-    let mut panel = RgbImage::from_pixel(PANEL, PANEL, PAPER);
-    let distance = camera_from_world.translation.vector.norm();
-    // The object's diagonal of 1 spans most of the panel.
-    let scale = PANEL as f32 * 0.9 * distance;
-    let size = PANEL as f32 * 2.0 / (points.len() as f32).sqrt();
-    let center = camera_from_world.translation.vector;
-    let mut placed: Vec<(f32, [f32; 2], [u8; 3])> = points
-        .iter()
-        .zip(colors)
-        .map(|(&point, &color)| {
-            let p = camera_from_world * Point3::from(point);
-            let at = |i: usize| PANEL as f32 / 2.0 + scale * (p[i] / p.z - center[i] / center.z);
-            (p.z, [at(0), at(1)], color)
-        })
-        .filter(|(depth, ..)| *depth > 0.0)
-        .collect();
-    placed.sort_by(|a, b| b.0.total_cmp(&a.0));
-    for (depth, at, color) in placed {
-        let shade = (1.0 - 0.7 * (depth - distance + 0.3)).clamp(0.4, 1.0);
-        splat(&mut panel, at, size, Rgb(color.map(|channel| (f32::from(channel) * shade) as u8)));
-    }
-    panel
 }
 
 /// Panels in a row, with a white seam.
@@ -212,20 +186,6 @@ pub fn stacked(rows: &[RgbImage]) -> RgbImage {
 
 pub fn save(image: &RgbImage, path: &Path) -> Result<()> {
     image.save(path).with_context(|| format!("cannot write {}", path.display()))
-}
-
-/// Draws a square around a location of the panel.
-fn splat(panel: &mut RgbImage, [u, v]: [f32; 2], side: f32, color: Rgb<u8>) {
-    let range = |center: f32, limit: u32| {
-        let first = (center - side / 2.0).round().max(0.0) as u32;
-        let last = (center + side / 2.0).round().clamp(0.0, limit as f32) as u32;
-        first..last
-    };
-    for y in range(v, panel.height()) {
-        for x in range(u, panel.width()) {
-            panel.put_pixel(x, y, color);
-        }
-    }
 }
 
 fn nearest_color(image: &ColorImage, [u, v]: [f32; 2]) -> [f32; 3] {

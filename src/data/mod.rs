@@ -19,6 +19,7 @@ pub mod lighting;
 pub mod rasteriser;
 pub mod viewpoint;
 pub mod crop;
+pub mod cloud_picture;
 pub mod sequence;
 pub mod formats;
 

@@ -9,6 +9,7 @@ mod data_config;
 mod crops;
 mod metrics;
 mod pose_errors;
+mod prior_report;
 mod regressor_stage;
 mod resume;
 mod sampled_chamfer;
@@ -19,6 +20,7 @@ mod stage;
 
 pub use config::{PriorStageConfig, RegressorStageConfig, Schedule, TrainingConfig};
 pub use data_config::DataConfig;
+pub use prior_report::{Reconstruction, ReconstructionErrors, ReportedShapes, report_prior};
 pub use shards::write_shard;
 
 use std::{fs, path::Path, sync::Mutex};

@@ -1,9 +1,11 @@
-//! `pba-train inspect`: what a collection of meshes holds, before hours are spent on it.
+//! `pba-train inspect`: what a collection of meshes holds, before hours are spent on it, and what a
+//! prior made of one.
 
 mod contact_sheet;
+mod prior;
 mod table;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::{ParallelProgressIterator, ProgressStyle};
@@ -25,8 +27,13 @@ use contact_sheet::{MAX_TILES, draw_tile, write_contact_sheet};
 #[derive(Args)]
 pub struct InspectArguments {
     /// Folder of meshes: ShapeNetCore v1 or v2, or any.
-    folder: PathBuf,
-    /// Folder for inspect.json and contact_sheet.png.
+    #[arg(required_unless_present = "prior")]
+    folder: Option<PathBuf>,
+    /// Folder of a shape prior: shows how well it gives back the meshes, or without these the shapes
+    /// that its training held out, and walks along its leading style directions.
+    #[arg(long)]
+    prior: Option<PathBuf>,
+    /// Folder for inspect.json and contact_sheet.png, or of a prior prior.json and prior.png.
     #[arg(long, default_value = "runs/inspect")]
     out: PathBuf,
     #[command(flatten)]
@@ -65,14 +72,24 @@ struct Unusable {
     reason: String,
 }
 
-/// Reads every model once. Fails if none of them can be used.
 pub fn inspect(arguments: &InspectArguments) -> Result<()> {
-    let (folder, out) = (&arguments.folder, &arguments.out);
-    let invalid = |reason| Error::Config { path: folder.clone(), reason };
-    let selection = arguments.selection.selection(&[]).map_err(invalid)?;
-    let models = Collection::open(folder, &selection)?.models;
+    let InspectArguments { folder, prior, out, selection } = arguments;
+    let models = |folder: &Path| -> Result<Vec<Model>> {
+        let invalid = |reason| Error::Config { path: folder.into(), reason };
+        let selection = selection.selection(&[]).map_err(invalid)?;
+        Ok(Collection::open(folder, &selection)?.models)
+    };
+    let models = folder.as_deref().map(models).transpose()?;
     std::fs::create_dir_all(out).map_err(Error::io(out))?;
+    match (prior, folder, models) {
+        (Some(prior), _, models) => prior::inspect(prior, models, out),
+        (None, Some(folder), Some(models)) => inspect_meshes(folder, &models, out),
+        _ => unreachable!("a folder is required without a prior"),
+    }
+}
 
+/// Reads every model once. Fails if none of them can be used.
+fn inspect_meshes(folder: &Path, models: &[Model], out: &Path) -> Result<()> {
     // Tiles are spread evenly over the collection.
     let stride = models.len().div_ceil(MAX_TILES);
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} models (ETA {eta})");
@@ -87,7 +104,7 @@ pub fn inspect(arguments: &InspectArguments) -> Result<()> {
         })
         .collect();
 
-    let mut report = Report { folder: folder.clone(), models: vec![], unusable: vec![] };
+    let mut report = Report { folder: folder.into(), models: vec![], unusable: vec![] };
     let mut tiles = Vec::new();
     for (model, result) in models.iter().zip(results) {
         match result {
@@ -111,7 +128,7 @@ pub fn inspect(arguments: &InspectArguments) -> Result<()> {
         None => Ok(()),
         Some(Unusable { reason, .. }) => {
             let reason = format!("none of its models is usable; the first: {reason}");
-            Err(Error::Collection { path: folder.clone(), reason })
+            Err(Error::Collection { path: folder.into(), reason })
         }
     }
 }
