@@ -140,11 +140,6 @@ pub fn checked_vertex(coordinates: [f32; 3]) -> Result<Point3<f32>, String> {
     }
 }
 
-/// A polygon's triangles: a fan about its first corner, which fills it where it is convex.
-pub fn fan<T: Copy>(corners: &[T]) -> impl Iterator<Item = [T; 3]> {
-    corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]])
-}
-
 /// The one colour of a triangle whose corners have three.
 pub fn mean_color(corners: [[f32; 3]; 3]) -> [f32; 3] {
     std::array::from_fn(|c| corners.iter().map(|color| color[c]).sum::<f32>() / 3.0)
@@ -206,14 +201,6 @@ mod tests {
         let mut dangling = triangle_mesh([[0., 0., 0.], [1., 0., 0.], [0., 1., 0.]]);
         dangling.triangles[0].vertices[2] = 3;
         check_refused(&dangling, "does not exist");
-    }
-
-    #[test]
-    fn a_polygon_becomes_a_fan() {
-        let triangles = |n: usize| fan(&(0..n).collect::<Vec<_>>()).collect::<Vec<_>>();
-        assert_eq!(triangles(5), [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
-        assert_eq!(triangles(3), [[0, 1, 2]]);
-        assert!((0..3).all(|n| triangles(n).is_empty()));
     }
 
     #[test]

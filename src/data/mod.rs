@@ -5,6 +5,7 @@
 
 pub mod mesh;
 pub mod mesh_file;
+mod polygon;
 mod obj;
 mod glb;
 mod ply_mesh;

@@ -5,8 +5,9 @@ use std::{fs, iter::Enumerate, path::Path, str::Lines};
 use nalgebra::Point3;
 
 use super::{
-    mesh::{GREY, Mesh, Triangle, checked_vertex, fan, mean_color},
+    mesh::{GREY, Mesh, Triangle, checked_vertex, mean_color},
     mesh_file::Loaded,
+    polygon::triangles,
 };
 use crate::{Error, Result};
 
@@ -51,7 +52,8 @@ impl<'a> Reader<'a> {
         for _ in 0..header.n_faces {
             let words = self.next_words()?;
             let (corners, color) = face(&words, mesh.vertices.len())?;
-            mesh.triangles.extend(fan(&corners).map(|corners| {
+            let position = |corner: u32| mesh.vertices[corner as usize];
+            mesh.triangles.extend(triangles(&corners, position).map(|corners| {
                 let blend = || mean_color(corners.map(|corner| colors[corner as usize]));
                 Triangle::plain(corners, color.unwrap_or_else(blend))
             }));

@@ -8,8 +8,9 @@ use ply_rs_bw::{
 };
 
 use super::{
-    mesh::{GREY, Mesh, Triangle, checked_vertex, fan, mean_color},
+    mesh::{GREY, Mesh, Triangle, checked_vertex, mean_color},
     mesh_file::Loaded,
+    polygon::triangles,
 };
 use crate::{Error, Result};
 
@@ -45,7 +46,8 @@ fn mesh(vertices: &[Element], faces: &[Element]) -> Result<Mesh, String> {
             let n = vertices.len();
             return Err(format!("face {idx} has a corner {corner}, and there are {n} vertices"));
         }
-        mesh.triangles.extend(fan(corners).map(|corners| {
+        let position = |corner: u32| mesh.vertices[corner as usize];
+        mesh.triangles.extend(triangles(corners, position).map(|corners| {
             let color = |corner: u32| vertices[corner as usize].color().unwrap_or(GREY);
             Triangle::plain(corners, face.color().unwrap_or_else(|| mean_color(corners.map(color))))
         }));

@@ -175,7 +175,7 @@ fn triangles(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
             .enumerate()
             .map(|(i, t)| if i % 2 == 0 { [t[0], t[1], t[2]] } else { [t[1], t[0], t[2]] })
             .collect(),
-        Mode::TriangleFan => super::mesh::fan(corners).collect(),
+        Mode::TriangleFan => super::polygon::fan(corners).collect(),
         Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => Vec::new(),
     }
 }

@@ -1,5 +1,9 @@
 use super::*;
-use crate::data::{keyed_rng, mesh::Triangle};
+use crate::data::{
+    keyed_rng,
+    mesh::Triangle,
+    polygon::tests::{L_SHAPE, is_inside, shoelace, star},
+};
 use rand::Rng;
 
 fn fixture(name: &str) -> PathBuf {
@@ -58,6 +62,58 @@ fn a_texture_lies_the_same_in_every_format() {
             assert_eq!(triangle.texture, Some(0));
             assert!(triangle.color.iter().all(|channel| (channel - 1.0).abs() < 1e-6));
         }
+    }
+}
+
+/// One face with these corners, in every format that has polygons.
+fn polygon_files(corners: &[[f32; 2]]) -> [(&'static str, String); 3] {
+    let n = corners.len();
+    let points = |start: &str| -> String {
+        corners.iter().map(|[x, y]| format!("{start}{x} {y} {}\n", x + 2.0 * y)).collect()
+    };
+    let indices =
+        |first: usize| (first..first + n).map(|idx| format!(" {idx}")).collect::<String>();
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex {n}\nproperty float x\nproperty float y\n\
+         property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+         {}{n}{}\n",
+        points(""),
+        indices(0)
+    );
+    [
+        ("face.obj", format!("{}f{}\n", points("v "), indices(1))),
+        ("face.off", format!("OFF\n{n} 1 0\n{}{n}{}\n", points(""), indices(0))),
+        ("face.ply", ply),
+    ]
+}
+
+#[test]
+fn concave_faces_are_filled_in_every_format() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for corners in [&L_SHAPE[..], &star()] {
+        for (name, text) in polygon_files(corners) {
+            let path = folder.path().join(name);
+            fs::write(&path, text).expect("writable");
+            let mesh = read_mesh(&path).expect("it has area").mesh;
+            let area = |triangle: &Triangle| mesh.area_vector(triangle).z / 2.0;
+            let covered: f32 = mesh.triangles.iter().map(area).sum();
+            assert!((covered - shoelace(corners)).abs() < 1e-5, "{name}: {covered}");
+            for triangle in &mesh.triangles {
+                let [x, y] = [0, 1].map(|axis| mesh.corners(triangle).map(|corner| corner[axis]));
+                let centroid = [x, y].map(|values| values.iter().sum::<f32>() / 3.0);
+                assert!(is_inside(corners, centroid) && area(triangle) > 0.0, "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_face_that_crosses_itself_is_read() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (name, text) in polygon_files(&[[0., 0.], [1., 1.], [1., 0.5], [0., 1.]]) {
+        let path = folder.path().join(name);
+        fs::write(&path, text).expect("writable");
+        read_mesh(&path).expect("it has area");
     }
 }
 

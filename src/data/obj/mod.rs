@@ -6,13 +6,13 @@ use std::{fs, path::Path};
 
 use self::materials::{Library, Material};
 use super::{
-    mesh::{Mesh, Triangle, checked_vertex, fan},
+    mesh::{Mesh, Triangle, checked_vertex},
     mesh_file::{Loaded, usable_uv},
+    polygon,
 };
 use crate::{Error, Result};
 
-/// Reads a mesh in the frame of its file. Polygons become fans of triangles; lines and points are
-/// left out.
+/// Reads a mesh in the frame of its file. Lines and points are left out.
 ///
 /// Materials and textures are read from the model's folder only: the file's own, or the one above
 /// when that is called `models`, as in ShapeNetCore v2.
@@ -84,15 +84,17 @@ impl Reader {
             return Err(format!("a face needs three corners, not {}", corners.len()));
         }
         let Material { color, texture } = self.material;
-        for corners in fan(&corners) {
+        let Mesh { vertices, triangles, .. } = &mut self.mesh;
+        let position = |corner: Corner| vertices[corner.vertex as usize];
+        triangles.extend(polygon::triangles(&corners, position).map(|corners| {
             let textured = corners.iter().all(|corner| corner.uv.is_some());
-            self.mesh.triangles.push(Triangle {
+            Triangle {
                 vertices: corners.map(|corner| corner.vertex),
                 uvs: corners.map(|corner| corner.uv.unwrap_or_default()),
                 color,
                 texture: texture.filter(|_| textured),
-            });
-        }
+            }
+        }));
         Ok(())
     }
 
