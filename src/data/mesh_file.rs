@@ -3,6 +3,8 @@
 //! Shape is strict: a file that does not parse is refused, with its line where it has lines.
 //! Appearance is lenient: a missing material or texture leaves a plain colour and a warning.
 
+mod textures;
+
 use std::{
     fs,
     io::Cursor,
@@ -12,6 +14,7 @@ use std::{
 use image::{ImageReader, RgbImage};
 use sha2::{Digest, Sha256};
 
+pub(super) use self::textures::Textures;
 use super::{
     glb::{read_gltf, read_gltf_buffers},
     mesh::Mesh,

@@ -49,20 +49,28 @@ fn a_car_is_the_same_in_every_format() {
     });
 }
 
+/// The file has the triangles of another, with their pictures where those lie.
+#[track_caller]
+fn check_is_textured_as(name: &str, expected: &str) {
+    let expected = read(expected).mesh;
+    let Loaded { mesh, warnings } = read(name);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!(mesh.textures, expected.textures);
+    assert_eq!(mesh.triangles.len(), expected.triangles.len());
+    for (triangle, of) in mesh.triangles.iter().zip(&expected.triangles) {
+        assert_eq!(mesh.corners(triangle), expected.corners(of));
+        assert_eq!((triangle.uvs, triangle.texture), (of.uvs, of.texture));
+        assert!(triangle.texture.is_some());
+        assert!(triangle.color.iter().all(|channel| (channel - 1.0).abs() < 1e-6));
+    }
+}
+
 #[test]
 fn a_texture_lies_the_same_in_every_format() {
-    let square = read("formats/square.obj").mesh;
-    for name in ["formats/square.glb", "formats/square.gltf"] {
-        let Loaded { mesh, warnings } = read(name);
-        assert!(warnings.is_empty(), "{warnings:?}");
-        assert_eq!(mesh.textures, square.textures);
-        for (triangle, expected) in mesh.triangles.iter().zip(&square.triangles) {
-            assert_eq!(mesh.corners(triangle), square.corners(expected));
-            assert_eq!(triangle.uvs, expected.uvs);
-            assert_eq!(triangle.texture, Some(0));
-            assert!(triangle.color.iter().all(|channel| (channel - 1.0).abs() < 1e-6));
-        }
+    for name in ["square.glb", "square.gltf", "square.ply", "square_by_vertex.ply"] {
+        check_is_textured_as(&format!("formats/{name}"), "formats/square.obj");
     }
+    check_is_textured_as("formats/squares.ply", "formats/squares.obj");
 }
 
 /// One face with these corners, in every format that has polygons.
@@ -124,7 +132,9 @@ fn damaged_files_are_read_or_refused() {
         let path = entry.expect("a fixture").path();
         fs::copy(&path, folder.path().join(path.file_name().expect("a name"))).expect("writable");
     }
-    for name in ["square.obj", "square.gltf", "square.glb", "car.glb", "car.ply", "car.off"] {
+    for name in
+        ["square.obj", "square.gltf", "square.glb", "squares.ply", "car.glb", "car.ply", "car.off"]
+    {
         let path = folder.path().join(name);
         let whole = fs::read(&path).expect("readable");
         for damage in 0..100 {

@@ -6,12 +6,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use image::RgbImage;
-
 use super::numbers;
 use crate::data::{
     mesh::GREY,
-    mesh_file::{decode_texture, resolve_inside},
+    mesh_file::{Textures, resolve_inside},
 };
 
 /// A diffuse colour, times a texture if there is one.
@@ -36,25 +34,20 @@ struct Entry {
 
 /// The materials of one model. It reads nothing outside of the model's folder.
 pub struct Library {
-    pub textures: Vec<RgbImage>,
-    pub warnings: Vec<String>,
+    pub textures: Textures,
     model_folder: PathBuf,
     /// Where the OBJ file lies, below `model_folder`.
     obj_folder: PathBuf,
     materials: HashMap<String, Entry>,
-    /// Textures by path below `model_folder`; `None` where they could not be read.
-    decoded: HashMap<PathBuf, Option<u32>>,
 }
 
 impl Library {
     pub fn new(model_folder: &Path, obj_folder: &Path) -> Self {
         Self {
-            textures: Vec::new(),
-            warnings: Vec::new(),
+            textures: Textures::new(model_folder),
             model_folder: model_folder.into(),
             obj_folder: obj_folder.strip_prefix(model_folder).unwrap_or(Path::new("")).into(),
             materials: HashMap::new(),
-            decoded: HashMap::new(),
         }
     }
 
@@ -119,35 +112,11 @@ impl Library {
         // Options such as `-s 1 1 1` stand before the name.
         let options = words.trim_start().starts_with('-');
         let name = if options { words.split_whitespace().next_back() } else { Some(words.trim()) };
-        let texture = self.texture(name.unwrap_or(""), folder);
+        let texture = self.textures.read(folder, name.unwrap_or(""));
         self.materials.entry(material_name.to_owned()).or_default().texture = texture;
     }
 
-    /// The place of a texture among `textures`; each file is decoded once.
-    fn texture(&mut self, name: &str, folder: &Path) -> Option<u32> {
-        let Some(path) = resolve_inside(folder, name) else {
-            self.warn(format!("texture {name:?} lies outside of the model's folder"));
-            return None;
-        };
-        if let Some(&texture) = self.decoded.get(&path) {
-            return texture;
-        }
-        let bytes = fs::read(self.model_folder.join(&path)).map_err(|error| error.to_string());
-        let texture = match bytes.and_then(|bytes| decode_texture(&bytes)) {
-            Ok(image) => {
-                self.textures.push(image);
-                Some(self.textures.len() as u32 - 1)
-            }
-            Err(reason) => {
-                self.warn(format!("texture {name:?}: {reason}"));
-                None
-            }
-        };
-        self.decoded.insert(path, texture);
-        texture
-    }
-
     fn warn(&mut self, warning: String) {
-        self.warnings.push(warning);
+        self.textures.warnings.push(warning);
     }
 }

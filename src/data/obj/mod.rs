@@ -27,9 +27,9 @@ pub fn read_obj(path: &Path) -> Result<Loaded> {
         reader.read_line(line).map_err(|reason| refuse(format!("line {}: {reason}", idx + 1)))?;
     }
     let Reader { mut mesh, library, .. } = reader;
-    mesh.textures = library.textures;
+    mesh.textures = library.textures.images;
     mesh.validate().map_err(refuse)?;
-    Ok(Loaded { mesh, warnings: library.warnings })
+    Ok(Loaded { mesh, warnings: library.textures.warnings })
 }
 
 struct Reader {
