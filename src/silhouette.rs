@@ -1,6 +1,9 @@
 //! One frame's silhouette: its pixels, as Eq. 5 counts them, and its outline, to a fraction of one.
 
-use crate::{data::ScalarImage, nearest_neighbours::NearestNeighbours};
+use crate::{
+    data::{ScalarImage, bilinear::bilinear},
+    nearest_neighbours::NearestNeighbours,
+};
 
 /// Coverage above which a location belongs to the object.
 pub const MASK_THRESHOLD: f32 = 0.5;
@@ -58,25 +61,13 @@ impl Silhouette {
     ///
     /// Beyond the frame, the coverage of its border goes on: nothing is known there.
     pub fn nearest_inside(&self, location: [f32; 2]) -> [f32; 2] {
+        let [coverage] = bilinear(&self.coverage, location);
         match &self.outline_search {
-            Some(search) if self.coverage_at(location) <= MASK_THRESHOLD => {
+            Some(search) if coverage <= MASK_THRESHOLD => {
                 self.outline[search.nearest_pixel(location) as usize]
             }
             _ => location,
         }
-    }
-
-    /// Coverage between pixel centres, bilinearly.
-    fn coverage_at(&self, [u, v]: [f32; 2]) -> f32 {
-        let (width, height) = self.coverage.dimensions();
-        let axis = |location: f32, side: u32| {
-            let at = (location - 0.5).clamp(0.0, (side - 1) as f32);
-            (at as u32, (at as u32 + 1).min(side - 1), at.fract())
-        };
-        let ((x, right, fx), (y, below, fy)) = (axis(u, width), axis(v, height));
-        let at = |x: u32, y: u32| self.coverage.get_pixel(x, y)[0];
-        let [above, below] = [y, below].map(|y| at(x, y) + fx * (at(right, y) - at(x, y)));
-        above + fy * (below - above)
     }
 }
 

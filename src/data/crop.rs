@@ -8,7 +8,7 @@ use image::{Luma, Rgb};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use rand::Rng;
 
-use super::{ColorImage, ScalarImage, viewpoint::project};
+use super::{ColorImage, ScalarImage, bilinear::bilinear, viewpoint::project};
 use crate::camera::Intrinsics;
 
 /// A virtual camera in the place of another one, turned towards a box in its picture.
@@ -105,18 +105,19 @@ impl CropCamera {
         let share = 1.0 / (n * n) as f32;
         for y in 0..side {
             for x in 0..side {
-                let (mut sum, mut coverage) = ([0.0; 3], [0.0; 1]);
+                let (mut sum, mut coverage) = (Vector3::zeros(), 0.0);
                 for sample in 0..n * n {
                     let [right, down] =
                         [sample % n, sample / n].map(|k| (k as f32 + 0.5) / n as f32);
                     let pixel = self.source_pixel([x as f32 + right, y as f32 + down]);
-                    add_bilinear(&mut sum, color, pixel, share);
+                    sum += share * Vector3::from(bilinear(color, pixel));
                     if in_picture(mask, pixel) {
-                        add_bilinear(&mut coverage, mask, pixel, share);
+                        let [covered] = bilinear(mask, pixel);
+                        coverage += share * covered;
                     }
                 }
-                warped.0.put_pixel(x, y, Rgb(sum));
-                warped.1.put_pixel(x, y, Luma(coverage));
+                warped.0.put_pixel(x, y, Rgb(sum.into()));
+                warped.1.put_pixel(x, y, Luma([coverage]));
             }
         }
         warped
@@ -173,32 +174,6 @@ fn ray(Intrinsics { focal, center }: &Intrinsics, pixel: [f32; 2]) -> Vector3<f3
 
 pub(super) fn in_picture(picture: &ScalarImage, [x, y]: [f32; 2]) -> bool {
     (0.0..picture.width() as f32).contains(&x) && (0.0..picture.height() as f32).contains(&y)
-}
-
-/// Adds `share` of the picture's value at `pixel`, or at the nearest one in the picture.
-pub(super) fn add_bilinear<P, const N: usize>(
-    sum: &mut [f32; N],
-    picture: &image::ImageBuffer<P, Vec<f32>>,
-    [x, y]: [f32; 2],
-    share: f32,
-) where
-    P: image::Pixel<Subpixel = f32>,
-{
-    let [width, height] = [picture.width() as f32, picture.height() as f32];
-    let [x, y] = [(x - 0.5).clamp(0.0, width - 1.0), (y - 0.5).clamp(0.0, height - 1.0)];
-    let [right, down] = [x.fract(), y.fract()];
-    let weights = [
-        (x.floor(), y.floor(), (1.0 - right) * (1.0 - down)),
-        (x.ceil(), y.floor(), right * (1.0 - down)),
-        (x.floor(), y.ceil(), (1.0 - right) * down),
-        (x.ceil(), y.ceil(), right * down),
-    ];
-    for (x, y, weight) in weights {
-        let value = picture.get_pixel(x as u32, y as u32).channels();
-        for (total, channel) in sum.iter_mut().zip(value) {
-            *total += share * weight * channel;
-        }
-    }
 }
 
 #[cfg(test)]

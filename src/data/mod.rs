@@ -19,6 +19,7 @@ pub mod texture;
 pub mod lighting;
 pub mod rasteriser;
 pub mod viewpoint;
+pub mod bilinear;
 pub mod crop;
 pub mod cloud_picture;
 pub mod sequence;

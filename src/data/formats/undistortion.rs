@@ -5,10 +5,7 @@ use image::{Luma, Rgb};
 use super::{axes::PIXEL_CENTRE, calibration::Calibration};
 use crate::{
     camera::Intrinsics,
-    data::{
-        ColorImage, ScalarImage,
-        crop::{add_bilinear, in_picture},
-    },
+    data::{ColorImage, ScalarImage, bilinear::bilinear, crop::in_picture},
 };
 
 /// Resamples a picture and its mask, bilinearly, from one camera to another of `size`.
@@ -34,13 +31,10 @@ pub fn undistort(
     for (x, y, color_pixel) in resampled.0.enumerate_pixels_mut() {
         let slopes = slopes(x, y);
         let pixel = from.project(slopes).map(|coordinate| coordinate as f32);
-        let (mut rgb, mut coverage) = ([0.0; 3], [0.0; 1]);
-        add_bilinear(&mut rgb, color, pixel, 1.0);
+        *color_pixel = Rgb(bilinear(color, pixel));
         if norm(slopes) <= reach && in_picture(mask, pixel) {
-            add_bilinear(&mut coverage, mask, pixel, 1.0);
+            resampled.1.put_pixel(x, y, Luma(bilinear(mask, pixel)));
         }
-        *color_pixel = Rgb(rgb);
-        resampled.1.put_pixel(x, y, Luma(coverage));
     }
     resampled
 }
