@@ -1,9 +1,11 @@
 //! Folders of the SRN data set: `intrinsics.txt`, `rgb/*.png` and `pose/*.txt`.
 //!
 //! Pictures have no masks. The object is what their alpha channel covers or, as in the data set itself,
-//! all but the white (or black) that is joined to the border. Poses are of the renderer's world.
+//! all but the white (or black) that is joined to the border. Poses are of the renderer's world. The
+//! intrinsics may be those of larger pictures: the data set's `cars_train` has them for 512 pixels of
+//! width, beside pictures of 128.
 
-use std::{fs, path::Path};
+use std::{fs, ops::Range, path::Path};
 
 use nalgebra::Isometry3;
 
@@ -13,9 +15,12 @@ use super::{
     hints::SequenceHints,
     listing::{Listing, Shot},
     masks::{MaskSource, mask_in},
-    pictures::{pictures_in, unusable},
+    pictures::{self, pictures_in, unusable},
 };
 use crate::{Error, Result};
+
+/// What may be a picture's side, in pixels.
+const SIDES: Range<f64> = 1.0..1e6;
 
 /// Whether a folder is laid out like this.
 pub fn is_srn(folder: &Path) -> bool {
@@ -28,9 +33,11 @@ pub fn is_srn(folder: &Path) -> bool {
 pub(super) fn list(folder: &Path, hints: &SequenceHints) -> Result<Listing> {
     let path = folder.join("intrinsics.txt");
     hints.refuse_focal().map_err(|reason| unusable(&path, &reason))?;
-    let (calibration, size) = read_intrinsics(&path)?;
-    let mut shots = vec![];
+    let camera = read_intrinsics(&path)?;
+    let mut listing = Listing::default();
     for path in pictures_in(&folder.join("rgb"))? {
+        let size = pictures::size(&path, false)?;
+        let calibration = camera.scaled_to(size).map_err(|reason| unusable(&path, &reason))?;
         let name = Path::new("rgb").join(path.file_name().unwrap_or_default());
         let stem = path.file_stem().unwrap_or_default();
         let pose_path = folder.join("pose").join(stem).with_extension("txt");
@@ -39,25 +46,57 @@ pub(super) fn list(folder: &Path, hints: &SequenceHints) -> Result<Listing> {
             None => MaskSource::Background,
         };
         let camera_from_world = Some(read_pose(&pose_path)?);
-        shots.push(Shot { path, name, upright: false, mask, calibration, size, camera_from_world });
+        if listing.shots.is_empty() && size != camera.size {
+            let note = format!("intrinsics of {:?} pixels scaled to {size:?}", camera.size);
+            listing.notes.push(note);
+        }
+        let shot = Shot { path, name, upright: false, mask, calibration, size, camera_from_world };
+        listing.shots.push(shot);
     }
-    let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(Listing { name, shots, ..Listing::default() })
+    listing.name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(listing)
 }
 
-/// `f cx cy 0.`, then the origin and the scale of a grid that we need not, then `height width`.
-fn read_intrinsics(path: &Path) -> Result<(Calibration, [usize; 2])> {
+/// The pinhole of an `intrinsics.txt`, in pixels of pictures of `size` = `[width, height]`.
+struct Camera {
+    focal: f64,
+    center: [f64; 2],
+    size: [usize; 2],
+}
+
+impl Camera {
+    /// The same for smaller or larger pictures of the same view.
+    fn scaled_to(&self, size: [usize; 2]) -> Result<Calibration, String> {
+        if size[0] * self.size[1] != size[1] * self.size[0] {
+            let taken = self.size;
+            return Err(format!("it is {size:?} pixels, and its intrinsics are of {taken:?}"));
+        }
+        let scale = size[0] as f64 / self.size[0] as f64;
+        let center = self.center.map(|coordinate| coordinate * scale);
+        Calibration::new([self.focal * scale; 2], center, Distortion::default())
+    }
+}
+
+/// `f cx cy 0.`, then what a grid takes and we need not, `height width`, and perhaps a 1 if poses were
+/// the other way round.
+fn read_intrinsics(path: &Path) -> Result<Camera> {
     let text = fs::read_to_string(path).map_err(Error::io(path))?;
-    let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
-    let first = lines.first().map(|line| numbers(line)).unwrap_or_default();
-    let last = lines.last().map(|line| numbers(line)).unwrap_or_default();
-    let ([f, cx, cy, ..], [height, width]) = (&first[..], &last[..]) else {
-        let reason = "its first line is not f, cx, cy and 0, or its last not height and width";
+    let lines: Vec<Vec<f64>> = text.lines().map(numbers).filter(|line| !line.is_empty()).collect();
+    let first = lines.first().map(Vec::as_slice).unwrap_or_default();
+    // Between them, the grid's origin has three numbers, its scale one.
+    let is_size = |line: &Vec<f64>| line.len() == 2 && line.iter().all(|l| SIDES.contains(l));
+    let size_at = lines.iter().position(is_size);
+    let (&[focal, cx, cy, ..], Some(size_at)) = (first, size_at) else {
+        let reason = "its first line is not f, cx, cy and 0, or none holds height and width";
         return Err(unusable(path, reason));
     };
-    let calibration = Calibration::new([*f; 2], [*cx, *cy], Distortion::default());
-    let calibration = calibration.map_err(|reason| unusable(path, &reason))?;
-    Ok((calibration, [*width as usize, *height as usize]))
+    if lines[size_at + 1..].iter().any(|line| line[0] != 0.0) {
+        return Err(unusable(path, "it says that poses are camera from world"));
+    }
+    let [width, height] = [lines[size_at][1], lines[size_at][0]].map(|side| side as usize);
+    let camera = Camera { focal, center: [cx, cy], size: [width, height] };
+    camera.scaled_to(camera.size).map_err(|reason| unusable(path, &reason))?;
+    Ok(camera)
 }
 
 /// World from camera, 16 numbers row by row.
@@ -131,11 +170,30 @@ mod tests {
     }
 
     #[test]
+    fn intrinsics_are_scaled_to_the_pictures() {
+        let folder = written();
+        let path = folder.path().join("intrinsics.txt");
+        // As DeepVoxels writes them, with the nearest depth of its grid and a direction of poses.
+        fs::write(&path, "525. 256. 252. 0.\n0. 0. 0.\n0.\n1.\n504 512\n0\n").expect("writable");
+        let listing = list(folder.path(), &SequenceHints::default()).expect("it is usable");
+        let (sequence, notes) = listing.load(folder.path()).expect("it is usable");
+        assert_eq!((sequence.size, sequence.intrinsics.focal), ([128, 126], [131.25; 2]));
+        assert_eq!(sequence.intrinsics.center, [64.0, 63.0]);
+        assert!(notes[0].contains("scaled"), "{notes:?}");
+
+        fs::write(&path, "525. 256. 256. 0.\n0. 0. 0.\n1.\n512 512\n").expect("writable");
+        let error = list(folder.path(), &SequenceHints::default()).unwrap_err().to_string();
+        assert!(error.contains("000000.png") && error.contains("[512, 512]"), "{error}");
+    }
+
+    #[test]
     fn broken_folders_are_refused_by_file() {
         for (name, text, reason) in [
             ("intrinsics.txt", "f cx cy\n1 2", "first line"),
             ("intrinsics.txt", "", "first line"),
             ("intrinsics.txt", "0 64 64 0\n128 128", "focal"),
+            ("intrinsics.txt", "131 64 64 0\n0 0 0\n1\n0 128", "height"),
+            ("intrinsics.txt", "131 64 64 0\n0 0 0\n1\n126 128\n1", "camera from world"),
             ("pose/000001.txt", "1 2 3", "16 numbers"),
             ("pose/000001.txt", "2 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1", "rotation"),
         ] {
