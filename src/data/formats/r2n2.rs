@@ -1,4 +1,6 @@
 //! Renderings of 3D-R2N2 (ShapeNetRendering): `rendering_metadata.txt` and a PNG for each of its lines.
+//!
+//! They are of ShapeNetCore v1's models as they are, which but for a quarter turn is the canonical frame.
 
 use std::{
     fs,
@@ -67,7 +69,8 @@ pub(super) fn list(folder: &Path, hints: &SequenceHints) -> Result<Listing> {
     let name = folder.canonicalize().map_err(Error::io(folder))?;
     let name = name.components().rev().find(|part| part.as_os_str() != "rendering");
     let name = name.map(|part| part.as_os_str().to_string_lossy().into_owned());
-    Ok(Listing { name: name.unwrap_or_default(), shots, ..Listing::default() })
+    let name = name.unwrap_or_default();
+    Ok(Listing { name, shots, canonical: true, ..Listing::default() })
 }
 
 #[cfg(test)]
