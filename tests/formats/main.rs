@@ -1,5 +1,7 @@
 //! Sequences of other programs, from file to frames, and our results back into their formats.
 
+mod cameras;
+
 use std::{
     fs,
     io::Cursor,
