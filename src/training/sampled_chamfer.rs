@@ -32,8 +32,8 @@ pub(super) fn sampled_chamfer(
         .zip(targets)
         .zip(queries)
         .map(|((generated, target), [mut of_generated, of_target])| {
-            let nearest_target = NearestNeighbours::new(target.clone());
-            let nearest_generated = NearestNeighbours::new(generated.to_vec());
+            let nearest_target = NearestNeighbours::new(target);
+            let nearest_generated = NearestNeighbours::new(generated);
             let mut partners: Vec<[f32; 3]> = of_generated
                 .iter()
                 .map(|&i| target[nearest_target.nearest(generated[i as usize]) as usize])
