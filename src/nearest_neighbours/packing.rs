@@ -1,5 +1,7 @@
 //! The order of points in a packed tree, and its boxes.
 
+use std::cmp::Ordering;
+
 use super::lanes::{Bounds, Boxes, Locations, WIDTH};
 
 /// Points from which on the two halves of a set are arranged side by side.
@@ -45,7 +47,9 @@ fn arrange(points: &mut [Point]) {
     }
     let middle = n_child * (points.len().div_ceil(n_child) / 2);
     let axis = bounds_of(points).longest_axis();
-    points.select_nth_unstable_by(middle, |a, b| a.at[axis].total_cmp(&b.at[axis]));
+    // All are finite, and this compares in fewer instructions than `total_cmp`.
+    let by_axis = |a: &Point, b: &Point| a.at[axis].partial_cmp(&b.at[axis]);
+    points.select_nth_unstable_by(middle, |a, b| by_axis(a, b).unwrap_or(Ordering::Equal));
 
     let (left, right) = points.split_at_mut(middle);
     if left.len() + right.len() < N_PARALLEL {
