@@ -36,7 +36,7 @@ impl Default for PriorStageConfig {
             network: ShapePriorConfig::default(),
             schedule: Schedule { steps: 4000, batch_size: 16, ..Schedule::default() },
             chamfer_queries: 1536,
-            batch_statistics: 0.4,
+            batch_statistics: 0.1,
         }
     }
 }
