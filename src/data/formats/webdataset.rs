@@ -8,12 +8,14 @@
 
 mod merge;
 mod part;
+mod reader;
 #[cfg(test)]
 mod tests;
 mod writer;
 
 pub use merge::merge_shards;
 pub use part::Part;
+pub use reader::{DecodedSample, ShardReader};
 pub use writer::ShardWriter;
 
 use std::{

@@ -2,16 +2,14 @@
 
 use std::{
     fs::File,
-    io::{self, BufReader, Read},
+    io::{self, BufReader},
     ops::Range,
     path::{Path, PathBuf},
 };
 
 use tar::Archive;
 
-use super::{
-    Contents, EXTENSIONS, Hashed, Manifest, Sample, ShardWriter, file_name, is_finished, unusable,
-};
+use super::{Contents, Hashed, Manifest, ShardWriter, is_finished, reader::read_sample, unusable};
 use crate::{Error, Result};
 
 /// Merges all shards of a dataset into the one at `out`, byte for byte what a single run writes.
@@ -19,15 +17,7 @@ use crate::{Error, Result};
 /// Refuses gaps, overlaps, shards of another dataset, and tars that are not what their manifests
 /// say: every sample is there exactly once.
 pub fn merge_shards(tars: &[PathBuf], out: &Path) -> Result<Contents> {
-    let mut shards = vec![];
-    for tar in tars {
-        let manifest = Manifest::read(tar)?;
-        let manifest = manifest.ok_or_else(|| unusable(tar, "it has no manifest: unfinished"))?;
-        shards.push((tar.as_path(), manifest));
-    }
-    shards.sort_by_key(|(_, Manifest { contents, .. })| {
-        (contents.samples.start, contents.samples.end)
-    });
+    let shards = read_manifests(tars)?;
     let contents = check_complete(&shards, out)?;
     if is_finished(out, &contents)? {
         return Ok(contents);
@@ -40,10 +30,24 @@ pub fn merge_shards(tars: &[PathBuf], out: &Path) -> Result<Contents> {
     Ok(contents)
 }
 
-/// What shards in order of their first samples hold together.
-fn check_complete(shards: &[(&Path, Manifest)], out: &Path) -> Result<Contents> {
+/// Finished shards, in order of their first samples.
+pub(super) fn read_manifests(tars: &[PathBuf]) -> Result<Vec<(&Path, Manifest)>> {
+    let mut shards = vec![];
+    for tar in tars {
+        let manifest = Manifest::read(tar)?;
+        let manifest = manifest.ok_or_else(|| unusable(tar, "it has no manifest: unfinished"))?;
+        shards.push((tar.as_path(), manifest));
+    }
+    shards.sort_by_key(|(_, Manifest { contents, .. })| {
+        (contents.samples.start, contents.samples.end)
+    });
+    Ok(shards)
+}
+
+/// What shards in order of their first samples hold together; `place` is where one is missing.
+pub(super) fn check_complete(shards: &[(&Path, Manifest)], place: &Path) -> Result<Contents> {
     let Some((_, Manifest { contents: first, .. })) = shards.first() else {
-        return Err(unusable(out, "there are no shards to merge"));
+        return Err(unusable(place, "there are no shards"));
     };
     let mut next = 0;
     for (tar, Manifest { contents, .. }) in shards {
@@ -57,16 +61,16 @@ fn check_complete(shards: &[(&Path, Manifest)], out: &Path) -> Result<Contents> 
         if start < next {
             return Err(unusable(tar, format!("sample {start} is in another shard as well")));
         }
-        check_reached(out, next, start)?;
+        check_reached(place, next, start)?;
         next = end;
     }
-    check_reached(out, next, first.total)?;
+    check_reached(place, next, first.total)?;
     Ok(Contents { samples: 0..first.total, ..first.clone() })
 }
 
-fn check_reached(out: &Path, next: usize, start: usize) -> Result<()> {
+fn check_reached(place: &Path, next: usize, start: usize) -> Result<()> {
     if next < start {
-        return Err(unusable(out, format!("samples {next} to {} are missing", start - 1)));
+        return Err(unusable(place, format!("samples {next} to {} are missing", start - 1)));
     }
     Ok(())
 }
@@ -76,17 +80,7 @@ fn copy_samples(tar: &Path, manifest: &Manifest, writer: &mut ShardWriter) -> Re
     let mut archive = Archive::new(Hashed::new(BufReader::new(file)));
     let mut entries = archive.entries().map_err(Error::io(tar))?;
     for sample_idx in manifest.contents.samples.clone() {
-        let mut files = [vec![], vec![], vec![]];
-        for (extension, bytes) in EXTENSIONS.into_iter().zip(&mut files) {
-            let name = file_name(sample_idx, extension);
-            let entry = entries.next().transpose().map_err(Error::io(tar))?;
-            let Some(mut entry) = entry.filter(|entry| *entry.path_bytes() == *name.as_bytes())
-            else {
-                return Err(unusable(tar, format!("{name} is not in its place")));
-            };
-            entry.read_to_end(bytes).map_err(Error::io(tar))?;
-        }
-        writer.append(&Sample { files })?;
+        writer.append(&read_sample(&mut entries, sample_idx, tar)?)?;
     }
     // What follows the samples counts as well.
     let mut hashed = archive.into_inner();

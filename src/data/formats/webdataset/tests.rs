@@ -103,6 +103,61 @@ fn gaps_overlaps_and_foreign_shards_are_refused() {
     check_refused(&[a, foreign], "another dataset");
 }
 
+/// Opens shards of six cars, and reads the third one's number and colours.
+fn read_third(path: &Path) -> Result<(usize, RgbImage)> {
+    let sample = ShardReader::open(path, "cars", 6)?.read::<Value>(2)?;
+    Ok((sample.metadata["idx"].as_u64().expect("a number") as usize, sample.color))
+}
+
+#[test]
+fn a_sample_is_read_by_its_number_from_a_tar_or_from_parts_or_from_both() {
+    let folder = folder();
+    let color = RgbImage::from_pixel(3, 2, Rgb([2, 20, 30]));
+    let parts = [(4..6, "c"), (0..2, "a"), (2..4, "b")];
+    for (samples, name) in parts {
+        write(&folder, name, "cars", samples);
+    }
+    assert_eq!(read_third(folder.path()).expect("all are there"), (2, color.clone()));
+    let whole = write(&folder, "whole", "cars", 0..6);
+    for path in [folder.path(), &whole] {
+        assert_eq!(read_third(path).expect("all are there"), (2, color.clone()));
+    }
+}
+
+#[test]
+fn shards_to_read_from_are_whole_and_of_the_dataset() {
+    #[track_caller]
+    fn check_unreadable(path: &Path, expected: &str) {
+        let error = read_third(path).expect_err("it is unusable");
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+    let folder = folder();
+    check_unreadable(folder.path(), "no shards");
+    check_unreadable(&folder.path().join("missing"), "missing");
+    let a = write(&folder, "a", "cars", 0..3);
+    check_unreadable(folder.path(), "samples 3 to 5 are missing");
+    check_unreadable(&a, "samples 3 to 5 are missing");
+    let b = write(&folder, "b", "planes", 3..6);
+    check_unreadable(
+        folder.path(),
+        "expected 6 samples of dataset cars, found 6 samples of dataset planes",
+    );
+
+    write(&folder, "b", "cars", 3..6);
+    let bytes = fs::read(&b).expect("it is there");
+    fs::write(&b, &bytes[..3 * 1024]).expect("writable");
+    check_unreadable(folder.path(), "are not 3 samples");
+    fs::remove_file(b.with_extension("json")).expect("it is there");
+    check_unreadable(folder.path(), "unfinished");
+
+    // Pictures have checksums of their own.
+    let whole = write(&folder, "whole", "cars", 0..6);
+    let mut bytes = fs::read(&whole).expect("it is there");
+    bytes[2 * 6 * 512 + 512 + 20] ^= 1;
+    fs::write(&whole, bytes).expect("writable");
+    check_unreadable(&whole, "00000002");
+}
+
 #[test]
 fn broken_shards_are_refused() {
     let folder = folder();
