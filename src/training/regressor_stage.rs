@@ -90,8 +90,8 @@ impl<'a> RegressorStage<'a> {
         let deviations =
             Tensor::from_data(self.prior.generator.deviations().into_data(), &autodiff);
         self.stage.train(
-            regressors,
-            |regressors, step| self.loss(regressors, step, deviations.clone(), &autodiff),
+            self.stage.resume(regressors)?,
+            |regressors, step| Ok(self.loss(regressors, step, deviations.clone(), &autodiff)),
             |regressors| self.measure(&regressors.valid()),
         )
     }

@@ -77,8 +77,8 @@ impl<'a> ShapeStage<'a> {
         let init = || network.init(&self.template(), &autodiff);
         let prior = seeded(self.device, self.config.seed, init);
         let prior = self.stage.train(
-            prior,
-            |prior, step| self.loss(prior, step, &autodiff),
+            self.stage.resume(prior)?,
+            |prior, step| Ok(self.loss(prior, step, &autodiff)),
             |prior| self.measure(&prior.valid()),
         )?;
         let prior = prior.valid();

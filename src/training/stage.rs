@@ -29,20 +29,24 @@ pub(super) struct Stage<'a> {
 }
 
 impl Stage<'_> {
-    /// Trains from where the last run was interrupted, or from `module`.
+    /// Where the last run was interrupted, or the start, with `module`.
+    pub fn resume<M: Module>(&self, module: M) -> Result<Progress<M>> {
+        // Gradients of distances in world units are small; Burn's own epsilon would hide them.
+        let optimizer = AdamConfig::new().with_epsilon(1e-8).init();
+        let start = Progress { step: 0, elapsed: Duration::ZERO, module, optimizer };
+        start.resume(&self.checkpoint_path())
+    }
+
+    /// Trains from there to the end.
     ///
     /// `loss` sees the module and the number of the step, on which alone its batch depends, so an
     /// interrupted run takes the same steps as an uninterrupted one.
     pub fn train<M: Module>(
         &self,
-        module: M,
-        loss: impl Fn(&M, usize) -> Terms,
+        mut progress: Progress<M>,
+        mut loss: impl FnMut(&M, usize) -> Result<Terms>,
         validate: impl Fn(&M) -> Measurements,
     ) -> Result<M> {
-        // Gradients of distances in world units are small; Burn's own epsilon would hide them.
-        let optimizer = AdamConfig::new().with_epsilon(1e-8).init();
-        let start = Progress { step: 0, elapsed: Duration::ZERO, module, optimizer };
-        let mut progress = start.resume(&self.checkpoint_path())?;
         let mut metrics = MetricsFile::open(self.out, self.name, progress.step)?;
         let bar = self.progress_bar(progress.step);
 
@@ -50,7 +54,7 @@ impl Stage<'_> {
         let Schedule { steps, log_every, validate_every, checkpoint_every, .. } = *self.schedule;
         while progress.step < steps {
             let rate = self.schedule.learning_rate(progress.step);
-            let terms = loss(&progress.module, progress.step);
+            let terms = loss(&progress.module, progress.step)?;
             let logged = progress.step.is_multiple_of(log_every).then(|| values(&terms));
             progress.module = descend(progress.module, &mut progress.optimizer, terms, rate);
             progress.elapsed += std::mem::replace(&mut clock, Instant::now()).elapsed();
