@@ -12,6 +12,7 @@ use burn::tensor::{Device, Tensor, TensorData, s};
 use object_pba::{
     chamfer::chamfer_distance,
     checkpoint::{REGRESSORS_FILE, SHAPE_FILE, load_shape},
+    config::write_config,
     data::{keyed_rng, procedural::car, surface::sample_surface},
     device::Backend,
     host::host_values,
@@ -83,12 +84,13 @@ fn one_seed_gives_the_same_weights_and_another_does_not() {
     assert!(one[0] != other[0] && one[1] != other[1]);
 }
 
-#[test]
-fn an_interrupted_run_goes_on_to_the_same_weights() {
+/// Kills a run in both stages, and compares what it comes to.
+#[track_caller]
+fn check_goes_on(config: &Path) {
     let out = tempfile::tempdir().unwrap();
     let command = || {
         let mut command = Command::new(env!("CARGO_BIN_EXE_pba-train"));
-        command.args(["all", "--config", TINY, "--out"]).arg(out.path());
+        command.args(["all", "--config"]).arg(config).arg("--out").arg(out.path());
         command
     };
     for (checkpoint, weights) in
@@ -106,12 +108,30 @@ fn an_interrupted_run_goes_on_to_the_same_weights() {
     }
     assert!(command().status().unwrap().success());
 
-    let uninterrupted = train(&tiny(), Backend::Flex);
+    let uninterrupted = train(&TrainingConfig::read(config).unwrap(), Backend::Flex);
     assert!(weights(out.path()) == weights(uninterrupted.path()));
     for stage in ["prior", "regressors"] {
         let steps = history(out.path(), stage, "step");
         assert_eq!(steps, history(uninterrupted.path(), stage, "step"));
     }
+}
+
+#[test]
+fn an_interrupted_run_goes_on_to_the_same_weights() {
+    check_goes_on(Path::new(TINY));
+}
+
+#[test]
+fn a_run_goes_on_in_the_middle_of_a_later_round() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("tiny.toml");
+    let mut config = tiny();
+    config.data.views_per_round = 1;
+    config.regressors.schedule.checkpoint_every = 7;
+    let steps_per_round = config.data.n_models / config.regressors.schedule.batch_size;
+    assert_eq!((7 / steps_per_round, 7 % steps_per_round), (3, 1));
+    write_config(&path, &config).unwrap();
+    check_goes_on(&path);
 }
 
 #[test]

@@ -140,6 +140,7 @@ impl TrainingConfig {
             ("n_validation", data.n_validation),
             ("views_per_model", data.views_per_model),
             ("paints_per_model", data.paints_per_model),
+            ("views_per_round", data.views_per_round),
             ("views_per_validation", data.views_per_validation),
             ("chamfer_queries", self.prior.chamfer_queries),
             ("checkpoint_every", self.prior.schedule.checkpoint_every),

@@ -35,37 +35,52 @@ pub(super) struct Crop {
     pub view: usize,
 }
 
-/// Renders `n_views` of each shape, spread over its paints.
-///
-/// A crop follows from (seed, model, view) alone: neither the number of threads nor which other
-/// models are asked for changes it.
-pub(super) fn render_crops(
-    config: &TrainingConfig,
-    shapes: &Shapes,
+/// The crops of all models, in their order. `go_on` is asked before each model; once it says no, the
+/// rest is left out.
+pub(super) fn crops_of_models(
     models: &[usize],
-    n_views: usize,
-    progress: impl Fn() + Sync,
+    crops_of_model: impl Fn(usize) -> Result<Vec<Crop>> + Sync,
+    go_on: impl Fn() -> bool + Sync,
 ) -> Result<Vec<Crop>> {
-    let paints = config.data.paints_per_model.min(n_views);
     let crops: Result<Vec<Vec<Crop>>> = models
         .par_iter()
         .enumerate()
+        .take_any_while(|_| go_on())
         .map(|(shape_idx, &model_idx)| {
-            let mut crops = Vec::with_capacity(n_views);
-            for paint in 0..paints {
-                let mesh = shapes.mesh(model_idx, paint)?;
-                let renderer = Renderer::new(&mesh);
-                for view in (paint..n_views).step_by(paints) {
-                    let mut rng = keyed_rng(config.seed, [VIEW + view as u64, model_idx as u64]);
-                    let crop = render_crop(config, &mesh.vertices, &renderer, &mut rng);
-                    crops.push(Crop { shape_idx, view, ..crop });
-                }
-            }
-            progress();
-            Ok(crops)
+            let crops = crops_of_model(model_idx)?.into_iter();
+            Ok(crops.map(|crop| Crop { shape_idx, ..crop }).collect())
         })
         .collect();
     Ok(crops?.into_iter().flatten().collect())
+}
+
+/// Renders these views of a model, in ascending order; views take turns in its paints.
+///
+/// A crop follows from (seed, model, view) alone: neither the number of threads nor which other
+/// models or views are asked for changes it.
+pub(super) fn render_model(
+    config: &TrainingConfig,
+    shapes: &Shapes,
+    model_idx: usize,
+    views: &[usize],
+) -> Result<Vec<Crop>> {
+    let n_paints = shapes.n_paints();
+    let mut crops = Vec::with_capacity(views.len());
+    for paint in 0..n_paints {
+        let mut views = views.iter().filter(|&view| view % n_paints == paint).peekable();
+        if views.peek().is_none() {
+            continue;
+        }
+        let mesh = shapes.mesh(model_idx, paint)?;
+        let renderer = Renderer::new(&mesh);
+        for &view in views {
+            let mut rng = keyed_rng(config.seed, [VIEW + view as u64, model_idx as u64]);
+            let crop = render_crop(config, &mesh.vertices, &renderer, &mut rng);
+            crops.push(Crop { view, ..crop });
+        }
+    }
+    crops.sort_by_key(|crop| crop.view);
+    Ok(crops)
 }
 
 impl Crop {
@@ -154,8 +169,8 @@ mod tests {
         config.regressors.network.crop_size = 32;
         let shapes = Shapes::open(&config.data, config.seed).expect("cars need no files");
         let pool = ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads start");
-        pool.install(|| render_crops(&config, &shapes, models, 3, || ()))
-            .expect("cars need no files")
+        let render = |model_idx| render_model(&config, &shapes, model_idx, &[0, 1, 2]);
+        pool.install(|| crops_of_models(models, render, || true)).expect("cars need no files")
     }
 
     #[track_caller]
@@ -175,6 +190,15 @@ mod tests {
     #[test]
     fn a_model_has_its_own_crops_whichever_others_are_asked_for() {
         check_same(&crops_of(&[1, 2], 1)[3..], &crops_of(&[2], 1));
+    }
+
+    #[test]
+    fn a_view_is_the_same_whichever_others_are_asked_for() {
+        let config = TrainingConfig::default();
+        let shapes = Shapes::open(&config.data, config.seed).expect("cars need no files");
+        let render =
+            |views: &[usize]| render_model(&config, &shapes, 1, views).expect("cars need no files");
+        check_same(&render(&[5]), &render(&[2, 3, 5])[2..]);
     }
 
     #[test]

@@ -23,6 +23,9 @@ pub struct DataConfig {
     /// Pictures of each training shape, and how many paints they are spread over.
     pub views_per_model: usize,
     pub paints_per_model: usize,
+    /// Pictures of each training shape in a round: what is in memory, twice. The next round is made
+    /// while one is trained on, and every view comes once before any comes again.
+    pub views_per_round: usize,
     /// Pictures of each held-out shape.
     pub views_per_validation: usize,
     pub viewpoints: ViewpointRange,
@@ -52,6 +55,7 @@ impl Default for DataConfig {
             points_per_model: 24_576,
             views_per_model: 24,
             paints_per_model: 3,
+            views_per_round: 4,
             views_per_validation: 8,
             viewpoints: ViewpointRange::default(),
             meshes: None,

@@ -1,20 +1,21 @@
 //! The second stage: from pictures to the styles of the first stage, and to poses.
 
-use std::path::Path;
+use std::{path::Path, thread};
 
 use burn::{
     module::Module,
     tensor::{Device, Tensor},
 };
 use indicatif::ProgressBar;
-use rand::Rng;
 use rayon::prelude::*;
 
 use super::{
     TrainingConfig,
     batches::{cloud_tensor, row_tensor},
-    crops::{Crop, render_crops},
+    crops::{Crop, crops_of_models, render_model},
     pose_errors::PoseErrors,
+    prefetch::Batches,
+    rounds::Rounds,
     seeded,
     shapes::{Shapes, Surface},
     stage::{Measurements, Stage, Terms},
@@ -40,7 +41,9 @@ pub(super) struct RegressorStage<'a> {
     stage: Stage<'a>,
     device: &'a Device,
     prior: &'a ShapePrior,
-    training: Pictures,
+    rounds: Rounds<'a>,
+    /// Of the training shapes.
+    styles: Styles,
     held_out: Pictures,
     /// Clouds of the held-out shapes.
     truth: Vec<Vec<[f32; 3]>>,
@@ -49,32 +52,33 @@ pub(super) struct RegressorStage<'a> {
 /// Crops of shapes, and the shapes' styles.
 struct Pictures {
     crops: Vec<Crop>,
-    styles: Vec<Vec<f32>>,
+    styles: Styles,
 }
+
+struct Styles(Vec<Vec<f32>>);
 
 impl<'a> RegressorStage<'a> {
     pub fn prepare(
         config: &'a TrainingConfig,
-        shapes: &Shapes,
+        shapes: &'a Shapes,
         prior: &'a ShapePrior,
         out: &'a Path,
         device: &'a Device,
     ) -> Result<Self> {
+        let rounds = Rounds::open(config, shapes)?;
         let n_seen = config.prior.network.n_encoder_points;
-        let styles = |models: &[usize]| -> Result<Vec<Vec<f32>>> {
+        let styles = |models: &[usize]| -> Result<Styles> {
             Ok(encode(prior, &shapes.surfaces(models, n_seen)?, device))
         };
-        let (training, held_out) = (shapes.training(), shapes.held_out());
-        let pictures = |models: &[usize], n_views: usize| -> Result<Pictures> {
-            let bar = ProgressBar::new(models.len() as u64).with_message("rendering");
-            let crops = render_crops(config, shapes, models, n_views, || bar.inc(1))?;
-            bar.finish_and_clear();
-            Ok(Pictures { crops, styles: styles(models)? })
-        };
+        let held_out = shapes.held_out();
         let truth = shapes.surfaces(&held_out, config.prior.network.n_points())?;
         Ok(Self {
-            training: pictures(&training, config.data.views_per_model)?,
-            held_out: pictures(&held_out, config.data.views_per_validation)?,
+            rounds,
+            styles: styles(&shapes.training())?,
+            held_out: Pictures {
+                crops: render_held_out(config, shapes)?,
+                styles: styles(&held_out)?,
+            },
             truth: truth.into_iter().map(|Surface(points)| points).collect(),
             stage: Stage { name: NAME, schedule: &config.regressors.schedule, out },
             config,
@@ -89,11 +93,16 @@ impl<'a> RegressorStage<'a> {
         let regressors = seeded(self.device, self.config.seed + 1, init);
         let deviations =
             Tensor::from_data(self.prior.generator.deviations().into_data(), &autodiff);
-        self.stage.train(
-            self.stage.resume(regressors)?,
-            |regressors, step| Ok(self.loss(regressors, step, deviations.clone(), &autodiff)),
-            |regressors| self.measure(&regressors.valid()),
-        )
+        let progress = self.stage.resume(regressors)?;
+        thread::scope(|scope| {
+            let steps = progress.step..self.stage.schedule.steps;
+            let mut batches = Batches::start(&self.rounds, steps, scope)?;
+            let loss = |regressors: &Regressors, step| {
+                let crops = batches.batch(step)?;
+                Ok(self.loss(regressors, step, &crops, deviations.clone(), &autodiff))
+            };
+            self.stage.train(progress, loss, |regressors| self.measure(&regressors.valid()))
+        })
     }
 
     /// Measures what was saved, and ends the stage.
@@ -108,19 +117,20 @@ impl<'a> RegressorStage<'a> {
         &self,
         regressors: &Regressors,
         step: usize,
+        crops: &[&Crop],
         deviations: Tensor<1>,
         device: &Device,
     ) -> Terms {
-        let (values, truths): (Vec<_>, Vec<_>) = (0..self.config.regressors.schedule.batch_size)
-            .into_par_iter()
-            .map(|i| {
+        let (values, truths): (Vec<_>, Vec<_>) = crops
+            .par_iter()
+            .enumerate()
+            .map(|(i, crop)| {
                 let mut rng = keyed_rng(self.config.seed, [BATCH + i as u64, step as u64]);
-                let crop = &self.training.crops[rng.random_range(0..self.training.crops.len())];
                 crop.augmented(self.config, &mut rng)
             })
             .unzip();
         let (styles, poses) = self.forward(regressors, &values, &truths, device);
-        let style_targets = self.training.styles_of(&truths, device);
+        let style_targets = self.styles.of(&truths, device);
         let pose_targets: Vec<_> = truths
             .iter()
             .map(|crop| PoseTarget::new(&crop.crop_from_world, crop.focal_ratio))
@@ -138,7 +148,7 @@ impl<'a> RegressorStage<'a> {
         for crops in self.held_out.crops.chunks(CHUNK) {
             let values: Vec<_> = crops.iter().map(Crop::values).collect();
             let (styles, poses) = self.forward(regressors, &values, crops, self.device);
-            let targets = self.held_out.styles_of(crops, self.device);
+            let targets = self.held_out.styles.of(crops, self.device);
             let loss = regressors.style.loss(styles, targets, deviations.clone());
             let share = crops.len() as f64 / self.held_out.crops.len() as f64;
             style_loss += share * f64::from(host_values(&loss)[0]);
@@ -167,7 +177,7 @@ impl<'a> RegressorStage<'a> {
         for (crop, truth) in crops.zip(&self.truth) {
             let crop = std::slice::from_ref(crop);
             let (style, _) = self.forward(regressors, &[crop[0].values()], crop, self.device);
-            let known = &self.held_out.styles[crop[0].shape_idx];
+            let known = &self.held_out.styles.0[crop[0].shape_idx];
             regressed += chamfer(style, truth);
             encoded += chamfer(row_tensor(std::slice::from_ref(known), self.device), truth);
         }
@@ -188,21 +198,34 @@ impl<'a> RegressorStage<'a> {
     }
 }
 
-impl Pictures {
+impl Styles {
     /// The styles of what these crops show, `[b, k]`.
-    fn styles_of(&self, crops: &[Crop], device: &Device) -> Tensor<2> {
-        let styles: Vec<_> = crops.iter().map(|crop| self.styles[crop.shape_idx].clone()).collect();
+    fn of(&self, crops: &[Crop], device: &Device) -> Tensor<2> {
+        let styles: Vec<_> = crops.iter().map(|crop| self.0[crop.shape_idx].clone()).collect();
         row_tensor(&styles, device)
     }
 }
 
+fn render_held_out(config: &TrainingConfig, shapes: &Shapes) -> Result<Vec<Crop>> {
+    let models = shapes.held_out();
+    let views: Vec<_> = (0..config.data.views_per_validation).collect();
+    let bar = ProgressBar::new(models.len() as u64).with_message("rendering");
+    let render = |model_idx| {
+        bar.inc(1);
+        render_model(config, shapes, model_idx, &views)
+    };
+    let crops = crops_of_models(&models, render, || true)?;
+    bar.finish_and_clear();
+    Ok(crops)
+}
+
 /// Styles of these surfaces.
-fn encode(prior: &ShapePrior, surfaces: &[Surface], device: &Device) -> Vec<Vec<f32>> {
+fn encode(prior: &ShapePrior, surfaces: &[Surface], device: &Device) -> Styles {
     let chunks = surfaces.chunks(CHUNK).map(|chunk| {
         let clouds: Vec<_> = chunk.iter().map(|Surface(points)| points.clone()).collect();
         host_values(&prior.encode(cloud_tensor(&clouds, device)))
     });
-    chunks
-        .flat_map(|styles| styles.chunks(prior.n_style()).map(<[_]>::to_vec).collect::<Vec<_>>())
-        .collect()
+    let styles = chunks
+        .flat_map(|styles| styles.chunks(prior.n_style()).map(<[_]>::to_vec).collect::<Vec<_>>());
+    Styles(styles.collect())
 }

@@ -34,7 +34,9 @@ pub(super) struct Shapes {
 }
 
 enum Source {
-    ProceduralCars,
+    ProceduralCars {
+        n_paints: usize,
+    },
     /// Each with `n_points` on its surface, and more where more are asked for.
     Meshes {
         models: Vec<Model>,
@@ -49,7 +51,8 @@ impl Shapes {
     pub fn open(config: &DataConfig, seed: u64) -> Result<Self> {
         let Some(root) = &config.meshes else {
             let (n_training, n_validation) = (config.n_models, config.n_validation);
-            return Ok(Self { source: Source::ProceduralCars, seed, n_training, n_validation });
+            let source = Source::ProceduralCars { n_paints: config.paints_per_model };
+            return Ok(Self { source, seed, n_training, n_validation });
         };
         let invalid = |reason| Error::Config { path: root.clone(), reason };
         let mut models = Collection::open(root, &config.selection().map_err(invalid)?)?.models;
@@ -82,10 +85,18 @@ impl Shapes {
         (self.n_training..self.n_training + self.n_validation).collect()
     }
 
-    /// A shape in one of its paints; what was scanned or modelled has but one.
+    /// Paints that each shape has; what was scanned or modelled has but one.
+    pub fn n_paints(&self) -> usize {
+        match self.source {
+            Source::ProceduralCars { n_paints } => n_paints,
+            Source::Meshes { .. } => 1,
+        }
+    }
+
+    /// A shape in one of its paints.
     pub fn mesh(&self, model_idx: usize, paint: usize) -> Result<Mesh> {
         match &self.source {
-            Source::ProceduralCars => {
+            Source::ProceduralCars { .. } => {
                 let car = self.procedural_car(model_idx);
                 Ok(car.mesh(&mut keyed_rng(self.seed, [PAINT + paint as u64, model_idx as u64])))
             }
@@ -101,7 +112,7 @@ impl Shapes {
     pub fn surfaces(&self, models: &[usize], n_points: usize) -> Result<Vec<Surface>> {
         let sample = |&model_idx: &usize| -> Result<Surface> {
             let points: Vec<Point3<f32>> = match &self.source {
-                Source::ProceduralCars => {
+                Source::ProceduralCars { .. } => {
                     let mut rng = keyed_rng(self.seed, [SURFACE, model_idx as u64]);
                     let mesh = self.procedural_car(model_idx).unpainted_mesh();
                     sample_surface(&mesh, n_points, &mut rng)

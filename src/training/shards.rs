@@ -8,8 +8,8 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::{
-    DataConfig, TrainingConfig,
-    crops::{Crop, render_crops},
+    TrainingConfig,
+    crops::{Crop, crops_of_models, render_model},
     shapes::Shapes,
 };
 use crate::{
@@ -46,11 +46,14 @@ pub fn write_shard(config: &TrainingConfig, part: Part, out: &Path) -> Result<Co
 
     let bar = ProgressBar::new(range.len() as u64).with_message("rendering");
     let mut writer = ShardWriter::create(&path, contents.clone())?;
+    let views: Vec<_> = (0..n_views).collect();
+    let render = |model_idx| {
+        bar.inc(1);
+        render_model(config, &shapes, model_idx, &views)
+    };
     for models in models[range].chunks(CHUNK) {
-        let mut crops = render_crops(config, &shapes, models, n_views, || bar.inc(1))?;
-        crops.sort_by_key(|crop| (crop.shape_idx, crop.view));
-        for crop in &crops {
-            writer.append(&sample(config, crop, models[crop.shape_idx]))?;
+        for crop in crops_of_models(models, render, || true)? {
+            writer.append(&sample(config, &crop, models[crop.shape_idx]))?;
         }
     }
     writer.finish()?;
@@ -58,17 +61,24 @@ pub fn write_shard(config: &TrainingConfig, part: Part, out: &Path) -> Result<Co
     Ok(contents)
 }
 
+/// Config keys that say where data lie, or which of the crops are shown when, but not what they are.
+const NO_ORIGIN: [&str; 3] = ["meshes", "cache", "views_per_round"];
+
 /// Names all that the crops follow from. Where a machine keeps its meshes is not part of it.
 fn fingerprint(config: &TrainingConfig, n_models: usize) -> String {
     #[derive(Serialize)]
-    struct Origin<'a> {
+    struct Origin {
         seed: u64,
         n_models: usize,
         procedural: bool,
         crop_size: usize,
         crop_margin: f32,
         box_jitter: f32,
-        data: &'a DataConfig,
+        data: toml::Table,
+    }
+    let mut data = toml::Table::try_from(&config.data).expect("configs are plain tables");
+    for key in NO_ORIGIN {
+        data.remove(key);
     }
     let origin = Origin {
         seed: config.seed,
@@ -77,7 +87,7 @@ fn fingerprint(config: &TrainingConfig, n_models: usize) -> String {
         crop_size: config.regressors.network.crop_size,
         crop_margin: config.regressors.network.crop_margin,
         box_jitter: config.regressors.box_jitter,
-        data: &DataConfig { meshes: None, cache: None, ..config.data.clone() },
+        data,
     };
     let text = toml::to_string(&origin).expect("configs are plain tables");
     Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
@@ -128,7 +138,7 @@ fn sample(config: &TrainingConfig, crop: &Crop, model: usize) -> Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::formats::webdataset::merge_shards;
+    use crate::{data::formats::webdataset::merge_shards, training::DataConfig};
     use std::path::PathBuf;
 
     fn config() -> TrainingConfig {
@@ -182,8 +192,9 @@ mod tests {
         other = config();
         other.data.views_per_model = 3;
         assert_ne!(print(&other), print(&config()));
-        // How long to train on the crops is another matter.
+        // How long to train on the crops, and on how many at a time, is another matter.
         other = config();
+        other.data.views_per_round += 1;
         other.regressors.schedule.steps += 1;
         assert_eq!(print(&other), print(&config()));
     }
