@@ -16,7 +16,7 @@ use object_pba::{
     data::{keyed_rng, procedural::car, surface::sample_surface},
     device::Backend,
     host::host_values,
-    training::{TrainingConfig, train_regressors, train_shape_prior},
+    training::{TrainingConfig, train_regressors, train_shape_prior, write_shard},
 };
 use serde_json::Value;
 use tempfile::TempDir;
@@ -132,6 +132,21 @@ fn a_run_goes_on_in_the_middle_of_a_later_round() {
     assert_eq!((7 / steps_per_round, 7 % steps_per_round), (3, 1));
     write_config(&path, &config).unwrap();
     check_goes_on(&path);
+}
+
+#[test]
+fn shards_give_the_weights_that_rendering_gives() {
+    let rendered = train(&tiny(), Backend::Flex);
+    let [shards, out] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    for part in ["2/2", "1/2"] {
+        write_shard(&tiny(), part.parse().unwrap(), shards.path()).unwrap();
+    }
+    fs::copy(rendered.path().join(SHAPE_FILE), out.path().join(SHAPE_FILE)).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pba-train"));
+    command.args(["regressors", "--config", TINY, "--out"]).arg(out.path());
+    command.arg("--shards").arg(shards.path());
+    assert!(command.status().unwrap().success());
+    assert!(weights(out.path()) == weights(rendered.path()));
 }
 
 #[test]

@@ -59,6 +59,10 @@ enum Command {
 struct TrainArguments {
     #[command(flatten)]
     arguments: Arguments,
+    /// The pictures that `pba-train shards` wrote by this config: one tar, or a folder of all parts.
+    /// Without it, they are rendered while training goes on.
+    #[arg(long)]
+    shards: Option<PathBuf>,
     #[arg(long, default_value_t)]
     device: Backend,
 }
@@ -105,8 +109,9 @@ fn main() -> ExitCode {
 }
 
 fn train(arguments: &TrainArguments, prior: bool, regressors: bool) -> Result<()> {
-    let TrainArguments { arguments, device } = arguments;
-    let config = arguments.config()?;
+    let TrainArguments { arguments, shards, device } = arguments;
+    let mut config = arguments.config()?;
+    config.data.shards = shards.clone().or(config.data.shards);
     let device = device.device();
     if prior {
         train_shape_prior(&config, &arguments.out, &device)?;

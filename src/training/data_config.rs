@@ -45,6 +45,9 @@ pub struct DataConfig {
     pub exclude: Vec<String>,
     /// Where the points of meshes are kept, so that no run samples them again.
     pub cache: Option<PathBuf>,
+    /// Where the training pictures are kept, as `pba-train shards` writes them: one tar of all, or a
+    /// folder of all parts. Without it, they are rendered while training goes on: the same ones.
+    pub shards: Option<PathBuf>,
 }
 
 impl Default for DataConfig {
@@ -66,6 +69,7 @@ impl Default for DataConfig {
             include: Vec::new(),
             exclude: Vec::new(),
             cache: None,
+            shards: None,
         }
     }
 }
@@ -83,9 +87,9 @@ impl DataConfig {
         })
     }
 
-    /// The same shapes and pictures, wherever their points are kept.
-    pub fn without_cache(&self) -> Self {
-        Self { cache: None, ..self.clone() }
+    /// The same shapes and pictures, wherever they are kept.
+    pub fn without_stores(&self) -> Self {
+        Self { cache: None, shards: None, ..self.clone() }
     }
 }
 

@@ -8,6 +8,7 @@ mod config;
 mod data_config;
 mod crops;
 mod crop_source;
+mod crop_sample;
 mod rounds;
 mod prefetch;
 mod metrics;
@@ -77,8 +78,8 @@ fn begin(config: &TrainingConfig, out: &Path) -> Result<()> {
     let holds = |file: &str| out.join(file).exists();
     if holds(CONFIG_FILE) {
         let other = TrainingConfig::read(&path)?;
-        let same_shapes = (config.seed, config.data.without_cache(), &config.prior)
-            == (other.seed, other.data.without_cache(), &other.prior);
+        let same_shapes = (config.seed, config.data.without_stores(), &config.prior)
+            == (other.seed, other.data.without_stores(), &other.prior);
         let same_regressors = config.regressors == other.regressors;
         let shape_begun = holds(SHAPE_FILE) || holds("prior.checkpoint");
         let regressors_begun = holds(REGRESSORS_FILE) || holds("regressors.checkpoint");

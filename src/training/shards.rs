@@ -2,23 +2,20 @@
 
 use std::{fs, path::Path};
 
-use image::{GrayImage, RgbImage};
 use indicatif::ProgressBar;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::{
     TrainingConfig,
-    crops::{Crop, crops_of_models, render_model},
+    crop_sample::sample_of_crop,
+    crops::{crops_of_models, render_model},
     shapes::Shapes,
 };
 use crate::{
     Error, Result,
     config::write_config,
-    data::formats::{
-        axes::{TransformMatrix, to_opengl_matrix},
-        webdataset::{Contents, Part, Sample, ShardWriter, is_finished},
-    },
+    data::formats::webdataset::{Contents, Part, ShardWriter, is_finished},
 };
 
 /// Models that are rendered at a time: enough for many threads, little enough for memory.
@@ -51,9 +48,10 @@ pub fn write_shard(config: &TrainingConfig, part: Part, out: &Path) -> Result<Co
         bar.inc(1);
         render_model(config, &shapes, model_idx, &views)
     };
+    let size = config.regressors.network.crop_size;
     for models in models[range].chunks(CHUNK) {
         for crop in crops_of_models(models, render, || true)? {
-            writer.append(&sample(config, &crop, models[crop.shape_idx]))?;
+            writer.append(&sample_of_crop(&crop, size, config.seed, models[crop.shape_idx]))?;
         }
     }
     writer.finish()?;
@@ -62,10 +60,10 @@ pub fn write_shard(config: &TrainingConfig, part: Part, out: &Path) -> Result<Co
 }
 
 /// Config keys that say where data lie, or which of the crops are shown when, but not what they are.
-const NO_ORIGIN: [&str; 3] = ["meshes", "cache", "views_per_round"];
+const NO_ORIGIN: [&str; 4] = ["meshes", "cache", "shards", "views_per_round"];
 
 /// Names all that the crops follow from. Where a machine keeps its meshes is not part of it.
-fn fingerprint(config: &TrainingConfig, n_models: usize) -> String {
+pub(super) fn fingerprint(config: &TrainingConfig, n_models: usize) -> String {
     #[derive(Serialize)]
     struct Origin {
         seed: u64,
@@ -93,52 +91,13 @@ fn fingerprint(config: &TrainingConfig, n_models: usize) -> String {
     Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// What is known of a crop, in the words of `transforms.json`.
-#[derive(Serialize)]
-struct Metadata {
-    seed: u64,
-    model: usize,
-    view: usize,
-    w: usize,
-    h: usize,
-    fl_x: f32,
-    fl_y: f32,
-    cx: f32,
-    cy: f32,
-    world: &'static str,
-    transform_matrix: TransformMatrix,
-}
-
-fn sample(config: &TrainingConfig, crop: &Crop, model: usize) -> Sample {
-    let size = config.regressors.network.crop_size;
-    let [focal, center] = [crop.focal_ratio * size as f32, size as f32 / 2.0];
-    let metadata = Metadata {
-        seed: config.seed,
-        model,
-        view: crop.view,
-        w: size,
-        h: size,
-        fl_x: focal,
-        fl_y: focal,
-        cx: center,
-        cy: center,
-        world: "canonical",
-        transform_matrix: to_opengl_matrix(&crop.crop_from_world),
-    };
-    let pixels = crop.pixels.as_chunks::<4>().0;
-    let pixel = |x: u32, y: u32| pixels[y as usize * size + x as usize];
-    let color = RgbImage::from_fn(size as u32, size as u32, |x, y| {
-        let [red, green, blue, _] = pixel(x, y);
-        [red, green, blue].into()
-    });
-    let mask = GrayImage::from_fn(size as u32, size as u32, |x, y| [pixel(x, y)[3]].into());
-    Sample::new(&color, &mask, &metadata)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{data::formats::webdataset::merge_shards, training::DataConfig};
+    use crate::{
+        data::formats::webdataset::merge_shards,
+        training::{DataConfig, crop_source::CropSource, crops::Crop},
+    };
     use std::path::PathBuf;
 
     fn config() -> TrainingConfig {
@@ -181,6 +140,38 @@ mod tests {
         }
     }
 
+    fn read(config: &TrainingConfig) -> Result<Vec<Crop>> {
+        let shapes = Shapes::open(&config.data, config.seed)?;
+        CropSource::open(config, &shapes)?.crops(&[0, 1], || true)
+    }
+
+    #[test]
+    fn stored_crops_are_rendered_ones_to_the_last_bit() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        write(&["1/2", "2/2"], folder.path());
+        let mut stored = config();
+        stored.data.shards = Some(folder.path().into());
+        let [rendered, stored] = [config(), stored].map(|config| read(&config).expect("readable"));
+        let data = |crops: Vec<Crop>| -> Vec<_> {
+            let data = |crop: Crop| {
+                (crop.shape_idx, crop.view, crop.pixels, crop.crop_from_world, crop.focal_ratio)
+            };
+            crops.into_iter().map(data).collect()
+        };
+        assert!(data(rendered) == data(stored));
+    }
+
+    #[test]
+    fn shards_of_other_crops_are_refused() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        write(&["1/1"], folder.path());
+        let mut other = config();
+        other.data.shards = Some(folder.path().into());
+        other.regressors.box_jitter = 0.0;
+        let error = read(&other).err().expect("it is another dataset").to_string();
+        assert!(error.contains("expected 10 samples of dataset"), "{error}");
+    }
+
     #[test]
     fn another_seed_or_view_count_is_another_dataset() {
         let print = |config: &TrainingConfig| fingerprint(config, 5);
@@ -194,8 +185,9 @@ mod tests {
         assert_ne!(print(&other), print(&config()));
         // How long to train on the crops, and on how many at a time, is another matter.
         other = config();
-        other.data.views_per_round += 1;
         other.regressors.schedule.steps += 1;
+        other.data.views_per_round += 1;
+        other.data.shards = Some("shards".into());
         assert_eq!(print(&other), print(&config()));
     }
 }
