@@ -11,6 +11,7 @@ mod crop_source;
 mod crop_sample;
 mod rounds;
 mod prefetch;
+mod held_out;
 mod metrics;
 mod pose_errors;
 mod prior_report;
@@ -21,6 +22,7 @@ mod shape_stage;
 mod shapes;
 mod shards;
 mod stage;
+mod styles;
 
 pub use config::{PriorStageConfig, RegressorStageConfig, Schedule, TrainingConfig};
 pub use data_config::DataConfig;

@@ -1,0 +1,107 @@
+//! Pictures of shapes that training does not see, to measure the regressors on.
+
+use burn::tensor::{Device, Tensor};
+use indicatif::ProgressBar;
+
+use super::{
+    TrainingConfig,
+    batches::cloud_tensor,
+    crops::{Crop, crops_of_models, render_model},
+    pose_errors::PoseErrors,
+    regressor_stage::regress,
+    shapes::{Shapes, Surface},
+    stage::Measurements,
+    styles::Styles,
+};
+use crate::{
+    Result, chamfer::chamfer_distance, host::host_values, regressor::Regressors,
+    shape_prior::ShapePrior,
+};
+
+/// Crops that are measured at a time.
+const CHUNK: usize = 64;
+
+pub(super) struct HeldOut<'a> {
+    prior: &'a ShapePrior,
+    device: &'a Device,
+    crops: Vec<Crop>,
+    styles: Styles,
+    /// Clouds of the shapes.
+    truth: Vec<Vec<[f32; 3]>>,
+}
+
+impl<'a> HeldOut<'a> {
+    pub fn prepare(
+        config: &TrainingConfig,
+        shapes: &Shapes,
+        prior: &'a ShapePrior,
+        device: &'a Device,
+    ) -> Result<Self> {
+        let (models, network) = (shapes.held_out(), &config.prior.network);
+        let seen = shapes.surfaces(&models, network.n_encoder_points)?;
+        let truth = shapes.surfaces(&models, network.n_points())?;
+        Ok(Self {
+            prior,
+            device,
+            crops: render(config, shapes, &models)?,
+            styles: Styles::encode(prior, &seen, device),
+            truth: truth.into_iter().map(|Surface(points)| points).collect(),
+        })
+    }
+
+    /// Errors of the regressed poses and styles.
+    pub fn measure(&self, regressors: &Regressors) -> Measurements {
+        let deviations = self.prior.generator.deviations();
+        let (mut style_loss, mut pose_errors) = (0.0, PoseErrors::default());
+        for crops in self.crops.chunks(CHUNK) {
+            let (styles, poses) = self.regress(regressors, crops);
+            let targets = self.styles.of(crops, self.device);
+            let loss = regressors.style.loss(styles, targets, deviations.clone());
+            let share = crops.len() as f64 / self.crops.len() as f64;
+            style_loss += share * f64::from(host_values(&loss)[0]);
+
+            let [_, n_outputs] = poses.dims();
+            for (crop, outputs) in crops.iter().zip(host_values(&poses).chunks(n_outputs)) {
+                let hypotheses = regressors.pose.hypotheses(outputs, crop.focal_ratio);
+                pose_errors.push(&hypotheses, &crop.crop_from_world);
+            }
+        }
+        let mut measurements = pose_errors.measurements();
+        measurements.push(("style_loss", style_loss));
+        measurements
+    }
+
+    /// Eq. 7 of the clouds that the regressed styles stand for, and of what the encoder knows.
+    pub fn measure_clouds(&self, regressors: &Regressors) -> Measurements {
+        let n_views = self.crops.len() / self.truth.len();
+        let chamfer = |style: Tensor<2>, truth: &Vec<[f32; 3]>| {
+            let truth = cloud_tensor(std::slice::from_ref(truth), self.device);
+            let distance = chamfer_distance(self.prior.generator.forward(style), truth);
+            f64::from(host_values(&distance)[0]) * 1e3 / self.truth.len() as f64
+        };
+        let (mut regressed, mut encoded) = (0.0, 0.0);
+        for (crops, truth) in self.crops.chunks(n_views).zip(&self.truth) {
+            let (style, _) = self.regress(regressors, &crops[..1]);
+            regressed += chamfer(style, truth);
+            encoded += chamfer(self.styles.of(&crops[..1], self.device), truth);
+        }
+        vec![("regressed_chamfer", regressed), ("encoded_chamfer", encoded)]
+    }
+
+    fn regress(&self, regressors: &Regressors, crops: &[Crop]) -> (Tensor<2>, Tensor<2>) {
+        let values: Vec<_> = crops.iter().map(Crop::values).collect();
+        regress(regressors, &values, crops, self.device)
+    }
+}
+
+fn render(config: &TrainingConfig, shapes: &Shapes, models: &[usize]) -> Result<Vec<Crop>> {
+    let views: Vec<_> = (0..config.data.views_per_validation).collect();
+    let bar = ProgressBar::new(models.len() as u64).with_message("rendering");
+    let render = |model_idx| {
+        bar.inc(1);
+        render_model(config, shapes, model_idx, &views)
+    };
+    let crops = crops_of_models(models, render, || true)?;
+    bar.finish_and_clear();
+    Ok(crops)
+}
