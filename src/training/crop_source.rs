@@ -13,7 +13,7 @@ use crate::{Result, data::formats::webdataset::ShardReader};
 pub(super) struct CropSource<'a> {
     config: &'a TrainingConfig,
     shapes: &'a Shapes,
-    /// What is not there is rendered.
+    /// Without them, crops are rendered.
     shards: Option<ShardReader>,
 }
 
