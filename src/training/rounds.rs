@@ -15,6 +15,7 @@ const ORDER: u64 = 32 << 32;
 pub(super) struct Rounds<'a> {
     config: &'a TrainingConfig,
     source: CropSource<'a>,
+    n_paints: usize,
     pub n_models: usize,
     pub batch_size: usize,
 }
@@ -24,6 +25,7 @@ impl<'a> Rounds<'a> {
         Ok(Self {
             config,
             source: CropSource::open(config, shapes)?,
+            n_paints: shapes.n_paints(),
             n_models: shapes.training().len(),
             batch_size: config.regressors.schedule.batch_size,
         })
@@ -42,9 +44,14 @@ impl<'a> Rounds<'a> {
     }
 
     /// The views in a round: each comes once before any comes again.
+    ///
+    /// They come paint by paint: a mesh takes longer to make than a view of it.
     fn views(&self, round: usize) -> Vec<usize> {
         let (n_views, n_shown) = (self.config.data.views_per_model, self.n_shown());
-        let mut views: Vec<_> = (0..n_shown).map(|i| (round * n_shown + i) % n_views).collect();
+        let mut by_paint: Vec<_> = (0..n_views).collect();
+        by_paint.sort_by_key(|view| (view % self.n_paints, *view));
+        let shown = (0..n_shown).map(|i| by_paint[(round * n_shown + i) % n_views]);
+        let mut views: Vec<_> = shown.collect();
         views.sort();
         views
     }
@@ -63,6 +70,7 @@ mod tests {
     fn config(views_per_model: usize, views_per_round: usize) -> TrainingConfig {
         let mut config = TrainingConfig::default();
         config.data.n_models = 3;
+        config.data.paints_per_model = 2;
         (config.data.views_per_model, config.data.views_per_round) =
             (views_per_model, views_per_round);
         config.regressors.schedule.batch_size = 4;
@@ -76,7 +84,8 @@ mod tests {
         let shapes = Shapes::open(&config.data, 0).expect("cars need no files");
         let rounds = Rounds::open(&config, &shapes).expect("cars need no files");
         let views: Vec<_> = (0..6).map(|round| rounds.views(round)).collect();
-        assert_eq!(views, [[0, 1], [2, 3], [0, 4], [1, 2], [3, 4], [0, 1]]);
+        // Views 0, 2 and 4 are of one paint, and come first.
+        assert_eq!(views, [[0, 2], [1, 4], [0, 3], [2, 4], [1, 3], [0, 2]]);
         // Of six crops, one whole batch.
         assert_eq!(rounds.steps_per_round(), 1);
     }
