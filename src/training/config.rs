@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use serde::{Deserialize, Serialize};
 
-use super::DataConfig;
+use super::{DataConfig, augmentation::AugmentationConfig};
 use crate::{Error, Result, regressor::RegressorConfig, shape_prior::ShapePriorConfig};
 
 /// A whole run: two runs of one config give the same weights.
@@ -49,11 +49,8 @@ pub struct RegressorStageConfig {
     pub schedule: Schedule,
     /// How far, as a share of its extent, each side of the object's box is off in training.
     pub box_jitter: f32,
-    /// Whether a mirrored shape is a shape: half of the pictures are then mirrored.
-    pub mirror: bool,
-    /// Standard deviations of each colour channel's gain, and of each pixel's noise.
-    pub gain_noise: f32,
-    pub pixel_noise: f32,
+    /// What is done to the pictures of a step.
+    pub augmentation: AugmentationConfig,
 }
 
 impl Default for RegressorStageConfig {
@@ -62,9 +59,7 @@ impl Default for RegressorStageConfig {
             network: RegressorConfig::default(),
             schedule: Schedule { steps: 8000, batch_size: 32, ..Schedule::default() },
             box_jitter: 0.05,
-            mirror: true,
-            gain_noise: 0.15,
-            pixel_noise: 0.02,
+            augmentation: AugmentationConfig::default(),
         }
     }
 }
@@ -133,6 +128,7 @@ impl TrainingConfig {
     pub fn check(&self) -> Result<(), String> {
         self.prior.network.check()?;
         self.regressors.network.check()?;
+        self.regressors.augmentation.check()?;
         let data = &self.data;
         data.selection()?;
         let positive = [

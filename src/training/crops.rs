@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use rand::Rng;
 use rayon::prelude::*;
 
-use super::{TrainingConfig, batches::normal, shapes::Shapes};
+use super::{RegressorStageConfig, TrainingConfig, shapes::Shapes};
 use crate::{
     Result,
     data::{
@@ -84,21 +84,14 @@ pub(super) fn render_model(
 }
 
 impl Crop {
-    /// What the network sees, as in a training step: perhaps mirrored, in other light, and noisy.
+    /// What the network sees in a training step, and where the camera then was.
     pub fn augmented(&self, config: &TrainingConfig, rng: &mut impl Rng) -> (Vec<f32>, Self) {
-        let regressors = &config.regressors;
-        let gains: [f32; 3] = std::array::from_fn(|_| 1.0 + regressors.gain_noise * normal(rng));
+        let RegressorStageConfig { augmentation, network, .. } = &config.regressors;
         let mut values = self.values();
-        for pixel in values.as_chunks_mut::<4>().0.iter_mut().filter(|pixel| pixel[3] > 0.0) {
-            let mask = pixel[3];
-            for (channel, gain) in pixel.iter_mut().zip(gains) {
-                let noisy = *channel * gain + mask * regressors.pixel_noise * normal(rng);
-                *channel = noisy.clamp(0.0, 1.0);
-            }
-        }
+        augmentation.apply(&mut values, network.crop_size, rng);
         let mut truth = Self { pixels: Vec::new(), ..*self };
-        if regressors.mirror && rng.random() {
-            mirror_columns(&mut values, regressors.network.crop_size);
+        if augmentation.mirror && rng.random() {
+            mirror_columns(&mut values, network.crop_size);
             truth.crop_from_world = mirrored(&self.crop_from_world);
         }
         (values, truth)

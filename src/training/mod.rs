@@ -3,6 +3,7 @@
 //! A run is a folder. Its config says everything that its weights depend on; a run that was
 //! interrupted goes on where its last checkpoint was, and a finished stage is left alone.
 
+mod augmentation;
 mod batches;
 mod config;
 mod data_config;
@@ -24,6 +25,7 @@ mod shards;
 mod stage;
 mod styles;
 
+pub use augmentation::AugmentationConfig;
 pub use config::{PriorStageConfig, RegressorStageConfig, Schedule, TrainingConfig};
 pub use data_config::DataConfig;
 pub use prior_report::{Reconstruction, ReconstructionErrors, ReportedShapes, report_prior};

@@ -26,12 +26,14 @@ impl PoseErrors {
         let n = self.likeliest.len();
         let mean = |errors: &[f64]| errors.iter().sum::<f64>() / n as f64;
         self.likeliest.sort_by(f64::total_cmp);
-        let flipped = self.likeliest.iter().filter(|&&error| error > 90.0).count();
+        let flipped =
+            |errors: &[f64]| errors.iter().filter(|&&error| error > 90.0).count() as f64 / n as f64;
         vec![
             ("mean_degrees", mean(&self.likeliest)),
             ("median_degrees", self.likeliest[n / 2]),
-            ("share_over_90_degrees", flipped as f64 / n as f64),
+            ("share_over_90_degrees", flipped(&self.likeliest)),
             ("mean_degrees_best_of_two", mean(&self.best_of_two)),
+            ("share_over_90_degrees_best_of_two", flipped(&self.best_of_two)),
         ]
     }
 }
@@ -51,6 +53,6 @@ mod tests {
         errors.push(&[turned(180.0), turned(10.0), turned(0.0)], &turned(0.0).0);
         let values: Vec<f64> = errors.measurements().iter().map(|(_, value)| *value).collect();
         let close = |(a, b): (&f64, f64)| (a - b).abs() < 1e-3;
-        assert!(values.iter().zip([180.0, 180.0, 1.0, 10.0]).all(close), "{values:?}");
+        assert!(values.iter().zip([180.0, 180.0, 1.0, 10.0, 0.0]).all(close), "{values:?}");
     }
 }
