@@ -3,7 +3,6 @@
 //! The networks and sizes are those of `benches/pytorch.py`, which times PyTorch's steps.
 
 use burn::{
-    module::Module,
     optim::{AdamConfig, GradientsParams},
     tensor::{Device, Distribution, Tensor},
 };

@@ -25,9 +25,9 @@ pub struct PriorStageConfig {
     pub schedule: Schedule,
     /// Points of each cloud, and of its reconstruction, that look for their nearest neighbour.
     pub chamfer_queries: usize,
-    /// The share of the steps in which the encoder normalises by its batch; then by what it has
-    /// gathered.
-    pub batch_statistics: f64,
+    /// Steps in which the encoder normalises by its batch; then by what it has gathered. The later
+    /// that is, the more there is to learn anew.
+    pub batch_statistics: usize,
 }
 
 impl Default for PriorStageConfig {
@@ -36,7 +36,7 @@ impl Default for PriorStageConfig {
             network: ShapePriorConfig::default(),
             schedule: Schedule { steps: 4000, batch_size: 16, ..Schedule::default() },
             chamfer_queries: 1536,
-            batch_statistics: 0.1,
+            batch_statistics: 150,
         }
     }
 }
@@ -95,11 +95,6 @@ impl Default for Schedule {
 }
 
 impl Schedule {
-    /// The step after this share of them.
-    pub fn share(&self, share: f64) -> usize {
-        (share * self.steps as f64) as usize
-    }
-
     /// The learning rate of a step, counted from zero.
     pub fn learning_rate(&self, step: usize) -> f64 {
         let warm_up = (step + 1) as f64 / self.warm_up.max(1) as f64;

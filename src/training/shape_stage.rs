@@ -117,7 +117,7 @@ impl<'a> ShapeStage<'a> {
             })
             .unzip();
         let seen = cloud_tensor(&seen, device);
-        let latent = match step < schedule.share(self.config.prior.batch_statistics) {
+        let latent = match step < self.config.prior.batch_statistics {
             true => prior.encoder.forward(seen),
             false => prior.encoder.with_running_statistics().forward(seen),
         };
