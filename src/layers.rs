@@ -49,7 +49,7 @@ impl Conv {
     /// `[b, h, w, c]` to `[b, h', w', c']`, with `h' = (h + 2 padding) / stride − window + 1`.
     pub fn forward(&self, picture: Tensor<4>) -> Tensor<4> {
         let ConvConfig { stride, window, padding, .. } = self.config;
-        self.linear.forward(windows(patches(pad(picture, padding), stride), window))
+        each_row(&self.linear, windows(patches(pad(picture, padding), stride), window))
     }
 }
 
@@ -67,10 +67,22 @@ impl Upsample {
     /// `[b, h, w, c]` to `[b, 2h, 2w, c']`.
     pub fn forward(&self, picture: Tensor<4>) -> Tensor<4> {
         let [b, h, w, _] = picture.dims();
-        let blocks = self.linear.forward(picture); // [b, h, w, 2 · 2 · c']
+        let blocks = each_row(&self.linear, picture); // [b, h, w, 2 · 2 · c']
         let c = blocks.dims()[3] / 4;
         blocks.reshape([b, h, w, 2, 2, c]).permute([0, 1, 3, 2, 4, 5]).reshape([b, 2 * h, 2 * w, c])
     }
+}
+
+/// A linear layer along the last axis, as one product of matrices.
+///
+/// Burn makes a product for each picture's row of it where it thinks that these fill the machine; on
+/// CPUs they do not.
+pub fn each_row<const D: usize>(linear: &Linear, input: Tensor<D>) -> Tensor<D> {
+    let mut dims = input.dims();
+    let n_rows = dims[..D - 1].iter().product();
+    let output = linear.forward(input.reshape([n_rows, dims[D - 1]]));
+    dims[D - 1] = output.dims()[1];
+    output.reshape(dims)
 }
 
 /// A linear layer whose weights keep the variance of activations that pass a ReLU next.

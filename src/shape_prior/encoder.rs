@@ -7,7 +7,7 @@ use burn::{
 };
 
 use super::ShapePriorConfig;
-use crate::layers::rectified_linear;
+use crate::layers::{each_row, rectified_linear};
 
 /// Layers that see one point each, the maximum over points, then layers that see them all.
 ///
@@ -56,8 +56,8 @@ impl PointEncoder {
     /// Latents `[b, k]` of clouds `[b, n, 3]`, in world units.
     pub fn forward(&self, points: Tensor<3>) -> Tensor<2> {
         let [first, second, third] = &self.point_layers;
-        let features = relu(second.forward(relu(first.forward(points))));
-        let pooled = third.forward(features).max_dim(1).squeeze_dim(1); // [b, c]
+        let features = relu(each_row(second, relu(each_row(first, points))));
+        let pooled = each_row(third, features).max_dim(1).squeeze_dim(1); // [b, c]
 
         let pooled = relu(self.pooled_norm.forward::<2>(pooled));
         let hidden = relu(self.hidden_norm.forward(self.hidden.forward(pooled)));

@@ -7,7 +7,7 @@ use burn::{
 };
 
 use super::{COARSEST_SIDE, ShapePriorConfig, Whitening};
-use crate::layers::{Conv, ConvConfig, Upsample, rectified_linear};
+use crate::layers::{Conv, ConvConfig, Upsample, each_row, rectified_linear};
 
 /// First hidden layer of both branches.
 const HIDDEN: usize = 256;
@@ -113,7 +113,7 @@ impl Generator {
             }
             grid = relu(upsample.forward(grid));
         }
-        self.grid_output.forward(grid).reshape([b as i32, -1, 3])
+        each_row(&self.grid_output, grid).reshape([b as i32, -1, 3])
     }
 }
 
