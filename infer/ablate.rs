@@ -14,7 +14,8 @@ use object_pba::{
     config::write_config,
     data::sequence::Sequence,
     host::host_points,
-    reconstruction::{Scores, hypotheses, initial_guess, points, score, views},
+    initial_guess::InitialGuess,
+    reconstruction::{Scores, points, score, views},
 };
 
 use crate::{Options, figures, input::Input, output};
@@ -71,11 +72,11 @@ fn compare(
     config: &BundleAdjustmentConfig,
     device: &Device,
 ) -> Result<[Arm; 3]> {
-    let guess = initial_guess(prior, sequence, &sequence.frames[0])
+    let guess = InitialGuess::of_sequence(prior, sequence, config.initial_style)
         .with_context(|| format!("{}: the reference frame's mask is empty", sequence.name))?;
     let generator = &prior.shape.generator;
     let n_frames = sequence.frames.len();
-    let with_prior = hypotheses(&guess, n_frames, config.objective.parameterisation);
+    let with_prior = guess.hypotheses(n_frames, config.objective.parameterisation);
     let cloud = points(generator, &with_prior[0], device);
     let free: Vec<Unknowns> = with_prior
         .iter()

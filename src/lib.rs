@@ -16,6 +16,7 @@ pub mod silhouette;
 pub mod loss;
 pub mod bundle_adjustment;
 pub mod metrics;
+pub mod initial_guess;
 pub mod reconstruction;
 pub mod training;
 pub mod data;

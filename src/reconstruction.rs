@@ -1,7 +1,6 @@
 //! From a sequence to poses and a cloud: initialise, adjust, score.
 
 use burn::tensor::{Device, Tensor};
-use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -10,57 +9,17 @@ use crate::{
         objective::{Objective, ObjectiveConfig},
         observations::Observations,
         shape_model::ShapeModel,
-        unknowns::{Parameterisation, Unknowns},
+        unknowns::Unknowns,
     },
     checkpoint::Prior,
-    data::{
-        crop::CropCamera,
-        sequence::{Frame, Sequence},
-    },
+    data::sequence::Sequence,
     host::{host_pixels, host_points},
+    initial_guess::InitialGuess,
     metrics::{PoseErrors, style_error},
     pseudo_render::{PseudoRenderConfig, visible_points},
-    silhouette::MASK_THRESHOLD,
 };
 
-/// R_s(I_0) and R_p(I_0): what the regressors make of one frame (Sec. 3.2).
-pub struct InitialGuess {
-    pub style: Vec<f32>,
-    /// `camera_from_world`, likeliest first, with the regressor's confidences.
-    pub poses: Vec<(Isometry3<f32>, f32)>,
-}
-
-/// Regresses style and pose from a frame; `None` when its mask is empty.
-pub fn initial_guess(prior: &Prior, sequence: &Sequence, frame: &Frame) -> Option<InitialGuess> {
-    let (size, margin) = (prior.regressors.crop_size(), prior.regressors.crop_margin());
-    let (mask, intrinsics) = (&frame.mask, &sequence.intrinsics);
-    let crop = CropCamera::around_silhouette(mask, MASK_THRESHOLD, intrinsics, size, margin)?;
-    let (color, mask) = crop.warp(&frame.color, &frame.mask);
-    let guess = prior.regressors.regress(&color, &mask, &crop);
-    let to_camera = |(pose, confidence)| (crop.camera_from_world(&pose), confidence);
-    let poses = guess.poses.into_iter().map(to_camera).collect();
-    Some(InitialGuess { style: guess.style, poses })
-}
-
-/// Share of the likeliest pose's confidence that another needs to be tried: front and back look alike
-/// coarsely, and where the regressor is sure, it is more often right than a coarse fit.
-const LEAST_CONFIDENCE: f32 = 0.2;
-
-/// The hypotheses that bundle adjustment starts from: Δp_l = 0, and each pose of the guess that is
-/// not too unlikely.
-pub fn hypotheses(
-    guess: &InitialGuess,
-    n_frames: usize,
-    parameterisation: Parameterisation,
-) -> Vec<Unknowns> {
-    let unknowns = |(pose, _): &(Isometry3<f32>, f32)| {
-        Unknowns::new(*pose, n_frames, &guess.style, parameterisation)
-    };
-    let least = LEAST_CONFIDENCE * guess.poses[0].1;
-    guess.poses.iter().filter(|(_, confidence)| *confidence >= least).map(unknowns).collect()
-}
-
-/// Initialises from the reference frame and adjusts. `None` when its mask is empty.
+/// Initialises and adjusts. `None` when the reference frame's mask is empty.
 pub fn reconstruct(
     prior: &Prior,
     sequence: &Sequence,
@@ -68,9 +27,9 @@ pub fn reconstruct(
     device: &Device,
     observe: &mut dyn FnMut(&Step, &Unknowns),
 ) -> Option<Outcome> {
-    let guess = initial_guess(prior, sequence, &sequence.frames[0])?;
+    let guess = InitialGuess::of_sequence(prior, sequence, config.initial_style)?;
     let parameterisation = config.objective.parameterisation;
-    let hypotheses = hypotheses(&guess, sequence.frames.len(), parameterisation);
+    let hypotheses = guess.hypotheses(sequence.frames.len(), parameterisation);
     let generator = &prior.shape.generator;
     Some(bundle_adjust(sequence, generator, &hypotheses, config, device, observe))
 }

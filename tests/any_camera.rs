@@ -15,7 +15,7 @@ use object_pba::{
         sequence::{Frame, Sequence},
         viewpoint::{centered_intrinsics, orbit_rotation},
     },
-    reconstruction::initial_guess,
+    initial_guess::InitialGuess,
 };
 
 /// The scene at this pose, as a sequence of one frame.
@@ -33,7 +33,8 @@ fn photograph(
 
 /// Degrees between the likeliest initial pose and the true one.
 fn initial_error(prior: &Prior, sequence: &Sequence, truth: &Isometry3<f32>) -> f32 {
-    let guess = initial_guess(prior, sequence, &sequence.frames[0]).expect("the mask is not empty");
+    let guess = InitialGuess::of_frame(prior, sequence, &sequence.frames[0])
+        .expect("the mask is not empty");
     guess.poses[0].0.rotation.angle_to(&truth.rotation).to_degrees()
 }
 

@@ -23,7 +23,7 @@ use self::{
     shape_model::ShapeModel,
     unknowns::Unknowns,
 };
-use crate::data::sequence::Sequence;
+use crate::{data::sequence::Sequence, initial_guess::InitialStyle};
 
 /// How the objective is minimised.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -47,6 +47,7 @@ pub struct BundleAdjustmentConfig {
     /// Initial poses that are tried; the one that ends with the least objective is kept. Front and back
     /// look alike until the frames are sharp.
     pub n_hypotheses: usize,
+    pub initial_style: InitialStyle,
     pub objective: ObjectiveConfig,
     pub adam: AdamConfig,
     pub lm: LevenbergMarquardtConfig,
@@ -59,6 +60,7 @@ impl Default for BundleAdjustmentConfig {
             solver: Solver::Lm,
             blurs: vec![3.0, 1.5, 0.7, 0.0],
             n_hypotheses: 2,
+            initial_style: InitialStyle::default(),
             objective: ObjectiveConfig::default(),
             adam: AdamConfig::default(),
             lm: LevenbergMarquardtConfig::default(),
