@@ -49,6 +49,8 @@ pub struct RegressorStageConfig {
     pub schedule: Schedule,
     /// How far, as a share of its extent, each side of the object's box is off in training.
     pub box_jitter: f32,
+    /// Shapes of a step that are decoded as well, to compare them point by point.
+    pub decoded_shapes: usize,
     /// What is done to the pictures of a step.
     pub augmentation: AugmentationConfig,
 }
@@ -59,6 +61,7 @@ impl Default for RegressorStageConfig {
             network: RegressorConfig::default(),
             schedule: Schedule { steps: 8000, batch_size: 32, ..Schedule::default() },
             box_jitter: 0.05,
+            decoded_shapes: 4,
             augmentation: AugmentationConfig::default(),
         }
     }

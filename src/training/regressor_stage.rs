@@ -17,7 +17,7 @@ use super::{
     rounds::Rounds,
     seeded,
     shapes::Shapes,
-    stage::{Stage, Terms},
+    stage::{SCALE, Stage, Terms},
     styles::Styles,
 };
 use crate::{
@@ -25,7 +25,7 @@ use crate::{
     checkpoint::load_regressors,
     data::keyed_rng,
     regressor::{PoseTarget, Regressors},
-    shape_prior::ShapePrior,
+    shape_prior::{Generator, ShapePrior},
 };
 
 const NAME: &str = "regressors";
@@ -71,13 +71,15 @@ impl<'a> RegressorStage<'a> {
         let regressors = seeded(self.device, self.config.seed + 1, init);
         let deviations =
             Tensor::from_data(self.prior.generator.deviations().into_data(), &autodiff);
+        let generator = self.prior.generator.clone().fork(&autodiff).freeze();
+        let target = StyleTarget { deviations, generator };
         let progress = self.stage.resume(regressors)?;
         thread::scope(|scope| {
             let steps = progress.step..self.stage.schedule.steps;
             let mut batches = Batches::start(&self.rounds, steps, scope)?;
             let loss = |regressors: &Regressors, step| {
                 let crops = batches.batch(step)?;
-                Ok(self.loss(regressors, step, &crops, deviations.clone(), &autodiff))
+                Ok(self.loss(regressors, step, &crops, &target, &autodiff))
             };
             self.stage
                 .train(progress, loss, |regressors| self.held_out.measure(&regressors.valid()))
@@ -97,7 +99,7 @@ impl<'a> RegressorStage<'a> {
         regressors: &Regressors,
         step: usize,
         crops: &[&Crop],
-        deviations: Tensor<1>,
+        target: &StyleTarget,
         device: &Device,
     ) -> Terms {
         let (values, truths): (Vec<_>, Vec<_>) = crops
@@ -114,10 +116,32 @@ impl<'a> RegressorStage<'a> {
             .iter()
             .map(|crop| PoseTarget::new(&crop.crop_from_world, crop.focal_ratio))
             .collect();
-        vec![
-            ("pose", regressors.pose.loss(poses, &pose_targets)),
-            ("style", regressors.style.loss(styles, style_targets, deviations)),
-        ]
+        let n_decoded = self.config.regressors.decoded_shapes.min(truths.len());
+        let mut terms = vec![("pose", regressors.pose.loss(poses, &pose_targets))];
+        if n_decoded > 0 {
+            terms.push(("shape", target.shape_distance(&styles, &style_targets, n_decoded)));
+        }
+        let style_loss = regressors.style.loss(styles, style_targets, target.deviations.clone());
+        terms.push(("style", style_loss));
+        terms
+    }
+}
+
+/// What regressed styles are held against, besides the encoder's.
+struct StyleTarget {
+    /// Of the latent along each style direction, `[k]`.
+    deviations: Tensor<1>,
+    generator: Generator,
+}
+
+impl StyleTarget {
+    /// Mean squared distance between the points that the first `n` of two batches of styles decode
+    /// to, in thousandths of squared world units. Points of one generator correspond: no neighbours
+    /// are needed.
+    fn shape_distance(&self, styles: &Tensor<2>, targets: &Tensor<2>, n: usize) -> Tensor<1> {
+        let decode = |styles: &Tensor<2>| self.generator.forward(styles.clone().slice(0..n));
+        let offsets = decode(styles) - decode(targets).detach();
+        offsets.square().sum_dim(2).mean() * SCALE
     }
 }
 

@@ -12,7 +12,7 @@ use super::{
     sampled_chamfer::sampled_chamfer,
     seeded,
     shapes::{Shapes, Surface},
-    stage::{Measurements, Stage, Terms},
+    stage::{Measurements, SCALE, Stage, Terms},
 };
 use crate::{
     Result, chamfer::chamfer_distance, data::keyed_rng, host::host_values, shape_prior::ShapePrior,
@@ -25,8 +25,6 @@ const TEMPLATE: u64 = 12 << 32;
 const ENCODING: u64 = 13 << 32;
 /// Shapes that lend their points to the template.
 const TEMPLATE_SHAPES: usize = 50;
-/// Squared world units are small numbers: losses and measurements are a thousand of them.
-const SCALE: f64 = 1e3;
 /// Clouds that are encoded or compared at a time.
 const CHUNK: usize = 16;
 

@@ -16,6 +16,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::{Schedule, metrics::MetricsFile, resume::Progress};
 use crate::{Error, Result, host::host_values};
 
+/// Squared world units are small numbers: losses and measurements are a thousand of them.
+pub(super) const SCALE: f64 = 1e3;
+
 /// Terms of a loss, by name, `[1]` each; training goes down their sum.
 pub(super) type Terms = Vec<(&'static str, Tensor<1>)>;
 /// Measurements, by name.
