@@ -1,5 +1,7 @@
 //! Painting flat pictures that are projected onto the body.
 
+use std::ops::Range;
+
 use image::{Rgb, RgbImage};
 use rand::Rng;
 
@@ -11,12 +13,34 @@ pub type Place = [f32; 2];
 /// Texels a metre: a few for each pixel of a car that fills a 128-pixel picture.
 const TEXELS_PER_METRE: f32 = 80.0;
 
+/// The side of a texel, in metres.
+const TEXEL: f32 = 1.0 / TEXELS_PER_METRE;
+
+/// A straight line between two places.
+type Edge = [Place; 2];
+
 /// A picture of one side of a car, to scale.
 pub struct Canvas {
     low: Place,
     high: Place,
     size: [usize; 2],
     texels: Vec<Color>, // rows from the top
+}
+
+/// A rectangle of texels.
+struct Window {
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
+
+impl Window {
+    /// Numbers of its texels in a picture of this width, row by row.
+    fn texels(&self, width: usize) -> impl Iterator<Item = usize> {
+        let columns = self.columns.clone();
+        self.rows
+            .clone()
+            .flat_map(move |row| columns.clone().map(move |column| row * width + column))
+    }
 }
 
 impl Canvas {
@@ -28,20 +52,22 @@ impl Canvas {
 
     /// Fills a closed outline, with smooth edges.
     pub fn fill(&mut self, outline: &[Place], color: Color) {
-        self.blend(outline, 0.0, color, |place| {
-            let distance = distance_to(outline, true, place);
-            if contains(outline, place) { distance } else { -distance }
-        });
+        let window = self.window(outline, TEXEL);
+        let distances = self.distances(&window, &closed(outline), TEXEL);
+        let inside = self.inside(&window, outline);
+        let depths = distances.into_iter().zip(inside);
+        self.blend(&window, color, depths.map(|(d, inside)| if inside { d } else { -d }));
     }
 
     /// Draws a line of the given width, in metres, along an open path.
     pub fn trace(&mut self, path: &[Place], width: f32, color: Color) {
-        self.blend(path, width, color, |place| 0.5 * width - distance_to(path, false, place));
+        let edges: Vec<_> = path.windows(2).map(|ends| [ends[0], ends[1]]).collect();
+        self.draw(&edges, width, color);
     }
 
     /// Draws a line of the given width, in metres, around a closed outline.
     pub fn outline(&mut self, outline: &[Place], width: f32, color: Color) {
-        self.blend(outline, width, color, |place| 0.5 * width - distance_to(outline, true, place));
+        self.draw(&closed(outline), width, color);
     }
 
     /// Multiplies smooth noise of the given cell size, in metres, onto the picture.
@@ -74,26 +100,70 @@ impl Canvas {
         })
     }
 
-    /// Covers with `color` where `depth`, the distance in metres inside of an edge, is positive.
-    fn blend(&mut self, around: &[Place], margin: f32, color: Color, depth: impl Fn(Place) -> f32) {
-        let texel = 1.0 / TEXELS_PER_METRE;
-        let reach = margin + texel;
+    fn draw(&mut self, edges: &[Edge], width: f32, color: Color) {
+        let reach = width + TEXEL;
+        let window = self.window(edges.as_flattened(), reach);
+        let distances = self.distances(&window, edges, reach);
+        self.blend(&window, color, distances.into_iter().map(|d| 0.5 * width - d));
+    }
+
+    /// Covers with `color` where the depth inside of an edge, in metres, is positive.
+    fn blend(&mut self, window: &Window, color: Color, depths: impl Iterator<Item = f32>) {
+        for (idx, depth) in window.texels(self.size[0]).zip(depths) {
+            let coverage = (0.5 + depth / TEXEL).clamp(0.0, 1.0);
+            for (value, target) in self.texels[idx].iter_mut().zip(color) {
+                *value += (target - *value) * coverage;
+            }
+        }
+    }
+
+    /// Distances of a window's texels from the nearest edge; infinite where none is in reach.
+    fn distances(&self, window: &Window, edges: &[Edge], reach: f32) -> Vec<f32> {
+        let width = window.columns.len();
+        let mut squared = vec![f32::INFINITY; width * window.rows.len()];
+        for edge in edges {
+            let near = self.window(edge, reach);
+            for row in near.rows {
+                let start = (row - window.rows.start) * width;
+                for column in near.columns.clone() {
+                    let nearest = &mut squared[start + column - window.columns.start];
+                    let place = self.place(row * self.size[0] + column);
+                    *nearest = nearest.min(squared_distance(edge, place));
+                }
+            }
+        }
+        squared.into_iter().map(f32::sqrt).collect()
+    }
+
+    /// Which texels of a window lie inside: a ray to the right crosses the outline an odd number of
+    /// times.
+    fn inside(&self, window: &Window, outline: &[Place]) -> Vec<bool> {
+        let mut inside = Vec::with_capacity(window.columns.len() * window.rows.len());
+        for row in window.rows.clone() {
+            let [_, y] = self.place(row * self.size[0]);
+            let edges = closed(outline).into_iter();
+            let crossed = edges.filter(|[[_, ay], [_, by]]| (*ay > y) != (*by > y));
+            let crossings: Vec<f32> =
+                crossed.map(|[[ax, ay], [bx, by]]| ax + (bx - ax) * (y - ay) / (by - ay)).collect();
+            inside.extend(window.columns.clone().map(|column| {
+                let [x, _] = self.place(row * self.size[0] + column);
+                crossings.iter().filter(|&&crossing| x < crossing).count() % 2 == 1
+            }));
+        }
+        inside
+    }
+
+    /// The texels in reach of some places.
+    fn window(&self, places: &[Place], reach: f32) -> Window {
         let end = |i: usize, choose: fn(f32, f32) -> f32, start: f32| {
-            around.iter().map(|place| place[i]).fold(start, choose)
+            places.iter().map(|place| place[i]).fold(start, choose)
         };
         let low = [0, 1].map(|i| end(i, f32::min, f32::INFINITY) - reach);
         let high = [0, 1].map(|i| end(i, f32::max, f32::NEG_INFINITY) + reach);
-
         let [width, height] = self.size;
-        let columns = texels_between(low[0] - self.low[0], high[0] - self.low[0], width);
-        let rows = texels_between(self.high[1] - high[1], self.high[1] - low[1], height);
-        for row in rows {
-            for idx in columns.clone().map(|column| row * width + column) {
-                let coverage = (0.5 + depth(self.place(idx)) / texel).clamp(0.0, 1.0);
-                for (value, target) in self.texels[idx].iter_mut().zip(color) {
-                    *value += (target - *value) * coverage;
-                }
-            }
+        Window {
+            columns: texels_between(low[0] - self.low[0], high[0] - self.low[0], width),
+            rows: texels_between(self.high[1] - high[1], self.high[1] - low[1], height),
         }
     }
 
@@ -125,29 +195,20 @@ pub fn rectangle([x0, y0]: Place, [x1, y1]: Place) -> [Place; 4] {
     [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
 }
 
-fn texels_between(start: f32, end: f32, limit: usize) -> std::ops::Range<usize> {
+fn texels_between(start: f32, end: f32, limit: usize) -> Range<usize> {
     let texel = |metres: f32| ((metres * TEXELS_PER_METRE).max(0.0) as usize).min(limit);
     texel(start)..(texel(end) + 1).min(limit)
 }
 
-/// Distance to the nearest point of a polyline.
-fn distance_to(path: &[Place], closed: bool, [x, y]: Place) -> f32 {
-    let n_edges = if closed { path.len() } else { path.len().saturating_sub(1) };
-    let squared = (0..n_edges).map(|edge| {
-        let ([ax, ay], [bx, by]) = (path[edge], path[(edge + 1) % path.len()]);
-        let (dx, dy) = (bx - ax, by - ay);
-        let along = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy).max(1e-12);
-        let along = along.clamp(0.0, 1.0);
-        (x - ax - along * dx).powi(2) + (y - ay - along * dy).powi(2)
-    });
-    squared.fold(f32::INFINITY, f32::min).sqrt()
+/// The edges of a closed outline.
+fn closed(outline: &[Place]) -> Vec<Edge> {
+    (0..outline.len()).map(|i| [outline[i], outline[(i + 1) % outline.len()]]).collect()
 }
 
-/// Whether a ray to the right crosses the outline an odd number of times.
-fn contains(outline: &[Place], [x, y]: Place) -> bool {
-    let edges = (0..outline.len()).map(|i| (outline[i], outline[(i + 1) % outline.len()]));
-    let crossings = edges.filter(|&([ax, ay], [bx, by])| {
-        (ay > y) != (by > y) && x < ax + (bx - ax) * (y - ay) / (by - ay)
-    });
-    crossings.count() % 2 == 1
+/// From the nearest point of an edge.
+fn squared_distance([[ax, ay], [bx, by]]: &Edge, [x, y]: Place) -> f32 {
+    let (dx, dy) = (bx - ax, by - ay);
+    let along = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy).max(1e-12);
+    let along = along.clamp(0.0, 1.0);
+    (x - ax - along * dx).powi(2) + (y - ay - along * dy).powi(2)
 }
