@@ -214,6 +214,36 @@ fn inspecting_a_collection_counts_draws_and_lists_what_failed() {
 }
 
 #[test]
+fn inspecting_a_prior_compares_its_reconstructions_with_what_needs_no_network() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let paths = [root.join("tests/fixtures/shapenet_v2"), root.join("assets/car-prior"), out];
+    let [meshes, prior, out] = paths.each_ref().map(|path| path.to_str().unwrap());
+    let output = pba_train(&["inspect", meshes, "--prior", prior, "--out", out]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("smarts_simple_car"));
+
+    let report = fs::read_to_string(Path::new(out).join("prior.json")).unwrap();
+    let report: Value = serde_json::from_str(&report).unwrap();
+    let error = |name: &str| report["shapes"][0][name].as_f64().unwrap();
+    assert!(error("noise_floor") < error("decoded").min(error("retrieved")));
+    assert!(error("retrieved") < error("mean_shape"));
+
+    // The car, its reconstruction and its nearest, then six directions; the last three tiles of the
+    // first row are empty.
+    let sheet = image::open(Path::new(out).join("prior.png")).unwrap().to_rgb8();
+    let (side, paper) = (sheet.width() / 6, image::Rgb([255; 3]));
+    assert_eq!(sheet.height(), 7 * side);
+    for tile in 0..6 {
+        let middle = sheet.get_pixel(tile * side + side / 2, side / 2);
+        assert_eq!(*middle == paper, tile >= 3, "tile {tile}");
+    }
+    let nothing = pba_train(&["inspect", "--out", out]);
+    assert!(String::from_utf8_lossy(&nothing.stderr).contains("<FOLDER>"));
+}
+
+#[test]
 fn axes_that_are_parallel_are_refused() {
     let meshes = boxes(1);
     let folder = meshes.path().to_str().unwrap();

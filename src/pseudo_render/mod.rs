@@ -10,7 +10,7 @@
 
 pub mod cells;
 pub mod discs;
-mod surface;
+pub mod surface;
 
 use burn::tensor::Tensor;
 use serde::{Deserialize, Serialize};

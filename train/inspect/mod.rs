@@ -30,7 +30,8 @@ pub struct InspectArguments {
     #[arg(required_unless_present = "prior")]
     folder: Option<PathBuf>,
     /// Folder of a shape prior: shows how well it gives back the meshes, or without these the shapes
-    /// that its training held out, and walks along its leading style directions.
+    /// that its training held out, and walks along its leading style directions. In the picture,
+    /// shapes are grey, reconstructions blue, nearest training shapes orange and walks green.
     #[arg(long)]
     prior: Option<PathBuf>,
     /// Folder for inspect.json and contact_sheet.png, or of a prior prior.json and prior.png.

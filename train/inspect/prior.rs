@@ -4,7 +4,7 @@ use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};
 use image::{RgbImage, imageops};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use object_pba::{
     Error, Result,
     checkpoint::{CONFIG_FILE, SHAPE_FILE, load_shape},
@@ -16,6 +16,7 @@ use object_pba::{
     },
     device::Backend,
     host::host_points,
+    pseudo_render::surface::Surface,
     shape_prior::ShapePrior,
     training::{
         Reconstruction, ReconstructionErrors, ReportedShapes, TrainingConfig, report_prior,
@@ -23,7 +24,8 @@ use object_pba::{
 };
 use serde::Serialize;
 
-/// Side of a tile, in pixels.
+/// Sides of the picture of a cloud and of its middle, which a tile shows, in pixels.
+const PICTURE: u32 = 236;
 const TILE: u32 = 180;
 /// Shapes of the picture, at most: truth, reconstruction and nearest training shape of each.
 const MAX_SHAPES: usize = 12;
@@ -101,7 +103,7 @@ fn print_table(report: &Report) {
 
 /// Truth, reconstruction and nearest training shape.
 fn tiles(shape: &Reconstruction) -> [RgbImage; 3] {
-    let colors = [[90, 90, 90], [40, 110, 200], [190, 120, 40]];
+    let colors = [[190, 190, 190], [90, 160, 250], [250, 175, 90]];
     let clouds = [&shape.truth, &shape.decoded, &shape.retrieved];
     [0, 1, 2].map(|i| tile(clouds[i], colors[i]))
 }
@@ -115,17 +117,28 @@ fn walk(prior: &ShapePrior, device: &Device) -> Vec<Vec<RgbImage>> {
             let mut style = vec![0.0; n_style];
             style[direction] = deviations;
             let style = Tensor::from_data(TensorData::new(style, [1, n_style]), device);
-            tile(&host_points(&prior.generator.forward(style)), [60, 130, 90])
+            tile(&host_points(&prior.generator.forward(style)), [120, 220, 160])
         };
         STEPS.map(step).to_vec()
     };
     directions.map(row).collect()
 }
 
-/// A cloud from its front left, slightly from above.
+/// A cloud from its front left, slightly from above, in the light of a lamp above its front.
 fn tile(points: &[[f32; 3]], color: [u8; 3]) -> RgbImage {
     let camera_from_world = look_at(Point3::new(-1.2, 0.8, -1.6), Point3::origin());
-    draw_cloud(&camera_from_world, points, &vec![color; points.len()], TILE)
+    let points_in_world: Vec<Point3<f32>> = points.iter().copied().map(Point3::from).collect();
+    let lamp = Vector3::new(-0.3, 0.8, -0.5);
+    let patches = Surface::of_cloud(&points_in_world).patches;
+    let shaded = points_in_world.iter().zip(patches).map(|(point, patch)| {
+        // Seen from the middle of a car, its surface faces away.
+        let outward = patch.normal * point.coords.dot(&patch.normal).signum();
+        let light = 0.45 + 0.55 * outward.dot(&lamp).max(0.0);
+        color.map(|channel| (f32::from(channel) * light) as u8)
+    });
+    let picture = draw_cloud(&camera_from_world, points, &shaded.collect::<Vec<_>>(), PICTURE);
+    let margin = (PICTURE - TILE) / 2;
+    imageops::crop_imm(&picture, margin, margin, TILE, TILE).to_image()
 }
 
 fn page(rows: &[Vec<RgbImage>]) -> RgbImage {
