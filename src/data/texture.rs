@@ -3,7 +3,7 @@
 //! A photometric loss compares one surface point across frames, so a texture must not alias: each
 //! lookup averages over the texels that one pixel covers, from a pyramid of halved images.
 
-use image::{Rgb, RgbImage};
+use image::RgbImage;
 use nalgebra::{Matrix2, Vector2};
 
 /// A repeating texture with its halved copies, the finest first and the coarsest 1 × 1.
@@ -26,10 +26,11 @@ impl Texture {
     /// An empty image becomes plain white.
     pub fn new(image: &RgbImage) -> Self {
         let finest = match image.dimensions() {
-            (0, _) | (_, 0) => Level::new([1, 1], |_, _| [255, 255, 255, 0]),
-            (width, height) => Level::new([width, height], |x, y| {
-                let Rgb([red, green, blue]) = *image.get_pixel(x, y);
-                [red, green, blue, 0]
+            (0, _) | (_, 0) => Level::new([1, 1], |_| vec![[255, 255, 255, 0]]),
+            (width, height) => Level::new([width, height], |y| {
+                let start = (y * width * 3) as usize;
+                let (row, _) = image.as_raw()[start..][..3 * width as usize].as_chunks();
+                row.iter().map(|&[red, green, blue]| [red, green, blue, 0]).collect()
             }),
         };
         let halvings = finest.size[0].max(finest.size[1]).next_power_of_two().ilog2();
@@ -69,21 +70,32 @@ impl Texture {
 }
 
 impl Level {
-    fn new([width, height]: [u32; 2], texel: impl Fn(u32, u32) -> [u8; 4]) -> Self {
-        let around = |side: u32| (0..side + 2).map(move |padded| (padded + side - 1) % side);
-        let texels = around(height).flat_map(|y| around(width).map(move |x| (x, y)));
-        Self { size: [width, height], texels: texels.map(|(x, y)| texel(x, y)).collect() }
+    /// From its rows, without the border.
+    fn new([width, height]: [u32; 2], row: impl Fn(u32) -> Vec<[u8; 4]>) -> Self {
+        let mut texels = Vec::with_capacity((width as usize + 2) * (height as usize + 2));
+        for y in std::iter::once(height - 1).chain(0..height).chain([0]) {
+            let row = row(y);
+            texels.push(row[row.len() - 1]);
+            texels.extend_from_slice(&row);
+            texels.push(row[0]);
+        }
+        Self { size: [width, height], texels }
     }
 
     /// Box-filtered to half the size, rounded up; an odd last row or column counts twice.
     fn halved(&self) -> Self {
-        let [last_x, last_y] = self.size.map(|side| side - 1);
-        Self::new(self.size.map(|side| side.div_ceil(2)), |x, y| {
-            let [x0, y0] = [2 * x, 2 * y];
-            let [x1, y1] = [(x0 + 1).min(last_x), (y0 + 1).min(last_y)];
-            let four = [[x0, y0], [x1, y0], [x0, y1], [x1, y1]].map(|texel| self.texel(texel));
-            let sum = |c: usize| four.iter().map(|texel| u32::from(texel[c])).sum::<u32>();
-            std::array::from_fn(|c| ((sum(c) + 2) / 4) as u8)
+        let [last_x, last_y] = self.size.map(|side| side as usize - 1);
+        let [width, height] = self.size.map(|side| side.div_ceil(2));
+        Self::new([width, height], |y| {
+            let y0 = 2 * y as usize;
+            let [upper, lower] = [y0, (y0 + 1).min(last_y)].map(|y| self.row(y));
+            let texel = |x0: usize| {
+                let x1 = (x0 + 1).min(last_x);
+                let four = [upper[x0], upper[x1], lower[x0], lower[x1]];
+                let sum = |c: usize| four.iter().map(|texel| u32::from(texel[c])).sum::<u32>();
+                std::array::from_fn(|c| ((sum(c) + 2) / 4) as u8)
+            };
+            (0..width as usize).map(|x| texel(2 * x)).collect()
         })
     }
 
@@ -110,8 +122,10 @@ impl Level {
         mix(between(above), between(above + stride), down)
     }
 
-    fn texel(&self, [x, y]: [u32; 2]) -> [u8; 4] {
-        self.texels[((y + 1) * (self.size[0] + 2) + x + 1) as usize]
+    /// A row without its border.
+    fn row(&self, y: usize) -> &[[u8; 4]] {
+        let width = self.size[0] as usize;
+        &self.texels[(y + 1) * (width + 2) + 1..][..width]
     }
 }
 
@@ -136,6 +150,7 @@ fn mix(from: [f32; 4], to: [f32; 4], share: f32) -> [f32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use image::Rgb;
 
     const POINT: Matrix2<f32> = Matrix2::new(0.0, 0.0, 0.0, 0.0);
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use image::{Rgb, RgbImage};
+use image::RgbImage;
 use rand::Rng;
 
 /// RGB in [0, 1].
@@ -23,8 +23,9 @@ type Edge = [Place; 2];
 pub struct Canvas {
     low: Place,
     high: Place,
-    size: [usize; 2],
-    texels: Vec<Color>, // rows from the top
+    /// Where the middles of the columns lie, from the left, and those of the rows, from the top.
+    middles: [Vec<f32>; 2],
+    texels: Vec<Color>, // row by row
 }
 
 /// A rectangle of texels.
@@ -46,8 +47,18 @@ impl Window {
 impl Canvas {
     /// One colour between the corners `low` and `high`.
     pub fn new(low: Place, high: Place, color: Color) -> Self {
-        let size = [0, 1].map(|i| ((high[i] - low[i]) * TEXELS_PER_METRE).ceil().max(1.0) as usize);
-        Self { low, high, size, texels: vec![color; size[0] * size[1]] }
+        let extent = [high[0] - low[0], high[1] - low[1]];
+        let size = extent.map(|extent| (extent * TEXELS_PER_METRE).ceil().max(1.0) as usize);
+        let middles =
+            |i: usize| (0..size[i]).map(move |texel| (texel as f32 + 0.5) / size[i] as f32);
+        let columns = middles(0).map(|right| low[0] + right * extent[0]);
+        let rows = middles(1).map(|down| high[1] - down * extent[1]);
+        Self {
+            low,
+            high,
+            middles: [columns.collect(), rows.collect()],
+            texels: vec![color; size[0] * size[1]],
+        }
     }
 
     /// Fills a closed outline, with smooth edges.
@@ -75,15 +86,19 @@ impl Canvas {
         let n_cells = [0, 1].map(|i| ((self.high[i] - self.low[i]) / cell).ceil() as usize + 2);
         let lattice: Vec<f32> =
             (0..n_cells[0] * n_cells[1]).map(|_| rng.random_range(-1.0..1.0)).collect();
-        for idx in 0..self.texels.len() {
-            let place = self.place(idx);
-            let [u, v] = [0, 1].map(|i| ((place[i] - self.low[i]) / cell).max(0.0));
-            let (column, row) = (u as usize, v as usize);
-            let node = |right, up| lattice[(row + up) * n_cells[0] + column + right];
-            let (s, t) = (u.fract(), v.fract());
-            let noise = (node(0, 0) * (1.0 - s) + node(1, 0) * s) * (1.0 - t)
-                + (node(0, 1) * (1.0 - s) + node(1, 1) * s) * t;
-            self.texels[idx] = self.texels[idx].map(|value| value * (1.0 + amplitude * noise));
+        // The cell that a middle lies in, and how far in.
+        let [across, up] = [0, 1].map(|i| -> Vec<(usize, f32)> {
+            let cells = self.middles[i].iter().map(|x| ((x - self.low[i]) / cell).max(0.0));
+            cells.map(|x| (x as usize, x.fract())).collect()
+        });
+        for (texels, &(row, t)) in self.texels.chunks_mut(across.len()).zip(&up) {
+            let [lower, upper] =
+                [row, row + 1].map(|row| &lattice[row * n_cells[0]..][..n_cells[0]]);
+            for (texel, &(column, s)) in texels.iter_mut().zip(&across) {
+                let along = |row: &[f32]| row[column] * (1.0 - s) + row[column + 1] * s;
+                let noise = along(lower) * (1.0 - t) + along(upper) * t;
+                *texel = texel.map(|value| value * (1.0 + amplitude * noise));
+            }
         }
     }
 
@@ -93,11 +108,11 @@ impl Canvas {
     }
 
     pub fn to_image(&self) -> RgbImage {
-        let [width, height] = self.size;
-        RgbImage::from_fn(width as u32, height as u32, |column, row| {
-            let texel = self.texels[row as usize * width + column as usize];
-            Rgb(texel.map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8))
-        })
+        let [width, height] = self.size().map(|size| size as u32);
+        let bytes = self.texels.as_flattened().iter().map(|value| {
+            (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8 // rounded
+        });
+        RgbImage::from_raw(width, height, bytes.collect()).expect("three bytes a texel")
     }
 
     fn draw(&mut self, edges: &[Edge], width: f32, color: Color) {
@@ -109,7 +124,7 @@ impl Canvas {
 
     /// Covers with `color` where the depth inside of an edge, in metres, is positive.
     fn blend(&mut self, window: &Window, color: Color, depths: impl Iterator<Item = f32>) {
-        for (idx, depth) in window.texels(self.size[0]).zip(depths) {
+        for (idx, depth) in window.texels(self.size()[0]).zip(depths) {
             let coverage = (0.5 + depth / TEXEL).clamp(0.0, 1.0);
             for (value, target) in self.texels[idx].iter_mut().zip(color) {
                 *value += (target - *value) * coverage;
@@ -123,12 +138,13 @@ impl Canvas {
         let mut squared = vec![f32::INFINITY; width * window.rows.len()];
         for edge in edges {
             let near = self.window(edge, reach);
+            let xs = &self.middles[0][near.columns.clone()];
             for row in near.rows {
-                let start = (row - window.rows.start) * width;
-                for column in near.columns.clone() {
-                    let nearest = &mut squared[start + column - window.columns.start];
-                    let place = self.place(row * self.size[0] + column);
-                    *nearest = nearest.min(squared_distance(edge, place));
+                let start = (row - window.rows.start) * width + near.columns.start;
+                let nearest = &mut squared[start - window.columns.start..][..xs.len()];
+                let y = self.middles[1][row];
+                for (nearest, &x) in nearest.iter_mut().zip(xs) {
+                    *nearest = nearest.min(squared_distance(edge, [x, y]));
                 }
             }
         }
@@ -140,15 +156,16 @@ impl Canvas {
     fn inside(&self, window: &Window, outline: &[Place]) -> Vec<bool> {
         let mut inside = Vec::with_capacity(window.columns.len() * window.rows.len());
         for row in window.rows.clone() {
-            let [_, y] = self.place(row * self.size[0]);
+            let y = self.middles[1][row];
             let edges = closed(outline).into_iter();
             let crossed = edges.filter(|[[_, ay], [_, by]]| (*ay > y) != (*by > y));
             let crossings: Vec<f32> =
                 crossed.map(|[[ax, ay], [bx, by]]| ax + (bx - ax) * (y - ay) / (by - ay)).collect();
-            inside.extend(window.columns.clone().map(|column| {
-                let [x, _] = self.place(row * self.size[0] + column);
-                crossings.iter().filter(|&&crossing| x < crossing).count() % 2 == 1
-            }));
+            inside.extend(
+                self.middles[0][window.columns.clone()]
+                    .iter()
+                    .map(|x| crossings.iter().filter(|&crossing| x < crossing).count() % 2 == 1),
+            );
         }
         inside
     }
@@ -160,22 +177,16 @@ impl Canvas {
         };
         let low = [0, 1].map(|i| end(i, f32::min, f32::INFINITY) - reach);
         let high = [0, 1].map(|i| end(i, f32::max, f32::NEG_INFINITY) + reach);
-        let [width, height] = self.size;
+        let [width, height] = self.size();
         Window {
             columns: texels_between(low[0] - self.low[0], high[0] - self.low[0], width),
             rows: texels_between(self.high[1] - high[1], self.high[1] - low[1], height),
         }
     }
 
-    /// The middle of a texel.
-    fn place(&self, idx: usize) -> Place {
-        let [width, height] = self.size;
-        let right = ((idx % width) as f32 + 0.5) / width as f32;
-        let down = ((idx / width) as f32 + 0.5) / height as f32;
-        [
-            self.low[0] + right * (self.high[0] - self.low[0]),
-            self.high[1] - down * (self.high[1] - self.low[1]),
-        ]
+    /// Columns and rows.
+    fn size(&self) -> [usize; 2] {
+        [0, 1].map(|i| self.middles[i].len())
     }
 }
 
