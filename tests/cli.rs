@@ -227,17 +227,18 @@ fn inspecting_a_prior_compares_its_reconstructions_with_what_needs_no_network() 
     let report = fs::read_to_string(Path::new(out).join("prior.json")).unwrap();
     let report: Value = serde_json::from_str(&report).unwrap();
     let error = |name: &str| report["shapes"][0][name].as_f64().unwrap();
-    assert!(error("noise_floor") < error("decoded").min(error("retrieved")));
+    assert!(error("noise_floor") < error("fitted").min(error("retrieved")));
+    assert!(error("fitted") < error("decoded"));
     assert!(error("retrieved") < error("mean_shape"));
 
-    // The car, its reconstruction and its nearest, then six directions; the last three tiles of the
-    // first row are empty.
+    // The car, its reconstruction, its fit and its nearest, then six directions; the last four tiles
+    // of the first row are empty.
     let sheet = image::open(Path::new(out).join("prior.png")).unwrap().to_rgb8();
-    let (side, paper) = (sheet.width() / 6, image::Rgb([255; 3]));
+    let (side, paper) = (sheet.width() / 8, image::Rgb([255; 3]));
     assert_eq!(sheet.height(), 7 * side);
-    for tile in 0..6 {
+    for tile in 0..8 {
         let middle = sheet.get_pixel(tile * side + side / 2, side / 2);
-        assert_eq!(*middle == paper, tile >= 3, "tile {tile}");
+        assert_eq!(*middle == paper, tile >= 4, "tile {tile}");
     }
     let nothing = pba_train(&["inspect", "--out", out]);
     assert!(String::from_utf8_lossy(&nothing.stderr).contains("<FOLDER>"));

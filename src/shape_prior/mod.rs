@@ -5,6 +5,7 @@
 //! smooth; both move the points of a learned template.
 
 mod encoder;
+mod fit;
 mod generator;
 mod whitening;
 

@@ -23,12 +23,15 @@ use crate::{
 const N_COARSE: usize = 1024;
 /// Training shapes that are then compared at full N.
 const N_CANDIDATES: usize = 12;
+/// Iterations that a style is fitted by.
+const FIT_ITERATIONS: usize = 40;
 
 /// A shape, and the clouds that stand for it, in world units (diagonal 1).
 pub struct Reconstruction {
     pub errors: ReconstructionErrors,
     pub truth: Vec<[f32; 3]>,
     pub decoded: Vec<[f32; 3]>,
+    pub fitted: Vec<[f32; 3]>,
     /// The best-matching training shape.
     pub retrieved: Vec<[f32; 3]>,
 }
@@ -39,6 +42,8 @@ pub struct ReconstructionErrors {
     pub id: String,
     /// The shape, encoded and decoded.
     pub decoded: f64,
+    /// The same, its style fitted to another sampling of the surface first.
+    pub fitted: f64,
     /// Another sampling of the same surface: what a perfect prior would score.
     pub noise_floor: f64,
     pub retrieved: f64,
@@ -53,7 +58,7 @@ pub enum ReportedShapes {
     Models(Vec<Model>),
 }
 
-/// Encodes and decodes each shape, and looks for its like among the training shapes.
+/// Encodes and decodes each shape, fits a style to it, and looks for its like among the training shapes.
 pub fn report_prior(
     config: &TrainingConfig,
     prior: &ShapePrior,
@@ -74,27 +79,25 @@ pub fn report_prior(
     let training = TrainingShapes::open(&known)?;
     let mean_shape = decode(prior, Tensor::zeros([1, prior.n_style()], device));
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} shapes (ETA {eta})");
-    let decoded: Vec<_> = surfaces
-        .iter()
-        .map(|Surface(points)| {
-            decode(prior, prior.encode(cloud_tensor(&[points[..n_seen].to_vec()], device)))
-        })
-        .collect();
-    let targets: Vec<_> = ids.into_iter().zip(surfaces).zip(decoded).collect();
-    targets
-        .into_par_iter()
+    let cloud = |points: &[[f32; 3]]| cloud_tensor(&[points.to_vec()], device);
+    ids.into_par_iter()
+        .zip(surfaces)
         .progress_with_style(style.expect("a valid template"))
-        .map(|((id, Surface(points)), decoded)| {
+        .map(|(id, Surface(points))| {
             let (truth, again) = points[n_seen..].split_at(n);
+            let encoded = prior.encode(cloud(&points[..n_seen]));
+            let fitted = prior.fit(cloud(again), encoded.clone(), FIT_ITERATIONS);
+            let [decoded, fitted] = [encoded, fitted].map(|style| decode(prior, style));
             let (retrieved, retrieved_error) = training.nearest(truth)?;
             let errors = ReconstructionErrors {
                 id,
                 decoded: style_error(&decoded, truth),
+                fitted: style_error(&fitted, truth),
                 noise_floor: style_error(again, truth),
                 retrieved: retrieved_error,
                 mean_shape: style_error(&mean_shape, truth),
             };
-            Ok(Reconstruction { errors, truth: truth.to_vec(), decoded, retrieved })
+            Ok(Reconstruction { errors, truth: truth.to_vec(), decoded, fitted, retrieved })
         })
         .collect()
 }

@@ -27,11 +27,11 @@ use serde::Serialize;
 /// Sides of the picture of a cloud and of its middle, which a tile shows, in pixels.
 const PICTURE: u32 = 236;
 const TILE: u32 = 180;
-/// Shapes of the picture, at most: truth, reconstruction and nearest training shape of each.
+/// Shapes of the picture, at most: truth, reconstruction, fit and nearest training shape of each.
 const MAX_SHAPES: usize = 12;
 /// The walk: how many leading directions, and how far, in standard deviations.
 const N_DIRECTIONS: usize = 6;
-const STEPS: [f32; 6] = [-2.5, -1.5, -0.5, 0.5, 1.5, 2.5];
+const STEPS: [f32; 8] = [-2.8, -2.0, -1.2, -0.4, 0.4, 1.2, 2.0, 2.8];
 
 /// The contents of prior.json: means and every shape, in squared world units (diagonal 1).
 #[derive(Serialize)]
@@ -80,6 +80,7 @@ fn means(errors: &[&ReconstructionErrors]) -> ReconstructionErrors {
     ReconstructionErrors {
         id: "mean".into(),
         decoded: mean(|errors| errors.decoded),
+        fitted: mean(|errors| errors.fitted),
         noise_floor: mean(|errors| errors.noise_floor),
         retrieved: mean(|errors| errors.retrieved),
         mean_shape: mean(|errors| errors.mean_shape),
@@ -89,23 +90,26 @@ fn means(errors: &[&ReconstructionErrors]) -> ReconstructionErrors {
 fn print_table(report: &Report) {
     println!("Chamfer distance (Eq. 7), 1e-3 squared diagonals at {} points", report.n_points);
     println!(
-        "{:32} {:>9} {:>9} {:>7} {:>9} {:>10}",
-        "shape", "decoded", "floor", "ratio", "retrieved", "mean shape"
+        "{:32} {:>9} {:>9} {:>9} {:>7} {:>9} {:>10}",
+        "shape", "decoded", "fitted", "floor", "ratio", "retrieved", "mean shape"
     );
     for errors in report.shapes.iter().copied().chain([&report.means]) {
-        let ReconstructionErrors { id, decoded, noise_floor, retrieved, mean_shape } = errors;
+        let ReconstructionErrors { id, decoded, fitted, noise_floor, retrieved, mean_shape } =
+            errors;
         let ratio = if id == "mean" { report.ratio_mean } else { decoded / noise_floor };
-        let [decoded, floor, retrieved, mean_shape] =
-            [decoded, noise_floor, retrieved, mean_shape].map(|error| error * 1e3);
-        println!("{id:32} {decoded:9.4} {floor:9.4} {ratio:7.2} {retrieved:9.4} {mean_shape:10.4}");
+        let errors = [decoded, fitted, noise_floor, retrieved, mean_shape];
+        let [decoded, fitted, floor, retrieved, mean_shape] = errors.map(|error| error * 1e3);
+        println!(
+            "{id:32} {decoded:9.4} {fitted:9.4} {floor:9.4} {ratio:7.2} {retrieved:9.4} {mean_shape:10.4}"
+        );
     }
 }
 
-/// Truth, reconstruction and nearest training shape.
-fn tiles(shape: &Reconstruction) -> [RgbImage; 3] {
-    let colors = [[190, 190, 190], [90, 160, 250], [250, 175, 90]];
-    let clouds = [&shape.truth, &shape.decoded, &shape.retrieved];
-    [0, 1, 2].map(|i| tile(clouds[i], colors[i]))
+/// Truth, reconstruction, fit and nearest training shape.
+fn tiles(shape: &Reconstruction) -> [RgbImage; 4] {
+    let colors = [[190, 190, 190], [90, 160, 250], [150, 130, 240], [250, 175, 90]];
+    let clouds = [&shape.truth, &shape.decoded, &shape.fitted, &shape.retrieved];
+    [0, 1, 2, 3].map(|i| tile(clouds[i], colors[i]))
 }
 
 /// A row for each leading direction of the style, all others at their mean.
