@@ -76,6 +76,10 @@ pub struct Schedule {
     /// The highest learning rate, after `warm_up` steps; it ends at a hundredth of it.
     pub learning_rate: f64,
     pub warm_up: usize,
+    /// Longest gradient of a tensor of weights; longer ones are shortened. Zero: none are.
+    pub gradient_norm: f32,
+    /// Measurements on held-out shapes without a new best after which a stage ends early. Zero: never.
+    pub patience: usize,
     /// Steps between lines of metrics.jsonl, and between measurements on held-out shapes.
     pub log_every: usize,
     pub validate_every: usize,
@@ -90,6 +94,8 @@ impl Default for Schedule {
             batch_size: 16,
             learning_rate: 1e-3,
             warm_up: 100,
+            gradient_norm: 0.0,
+            patience: 0,
             log_every: 50,
             validate_every: 1000,
             checkpoint_every: 500,

@@ -14,7 +14,7 @@ use crate::{
         rasteriser::Renderer,
         viewpoint::{Viewpoint, projected_box},
     },
-    regressor::crop_values,
+    regressor::{PoseTarget, crop_values},
 };
 
 /// The random stream of a picture: the first half of its key, with the number of the view.
@@ -95,6 +95,11 @@ impl Crop {
             truth.crop_from_world = mirrored(&self.crop_from_world);
         }
         (values, truth)
+    }
+
+    /// What the pose regressor should say.
+    pub fn pose_target(&self) -> PoseTarget {
+        PoseTarget::new(&self.crop_from_world, self.focal_ratio)
     }
 
     /// What the network sees, untouched.

@@ -49,16 +49,20 @@ impl<'a> HeldOut<'a> {
         })
     }
 
-    /// Errors of the regressed poses and styles.
+    /// Errors of the regressed poses and styles. The first, the sum of both losses, tells which of two
+    /// sets of weights is better.
     pub fn measure(&self, regressors: &Regressors) -> Measurements {
         let deviations = self.prior.generator.deviations();
-        let (mut style_loss, mut pose_errors) = (0.0, PoseErrors::default());
+        let (mut pose_loss, mut style_loss) = (0.0, 0.0);
+        let mut pose_errors = PoseErrors::default();
         for crops in self.crops.chunks(CHUNK) {
             let (styles, poses) = self.regress(regressors, crops);
             let targets = self.styles.of(crops, self.device);
-            let loss = regressors.style.loss(styles, targets, deviations.clone());
             let share = crops.len() as f64 / self.crops.len() as f64;
-            style_loss += share * f64::from(host_values(&loss)[0]);
+            let share_of = |loss: Tensor<1>| share * f64::from(host_values(&loss)[0]);
+            style_loss += share_of(regressors.style.loss(styles, targets, deviations.clone()));
+            let targets: Vec<_> = crops.iter().map(Crop::pose_target).collect();
+            pose_loss += share_of(regressors.pose.loss(poses.clone(), &targets));
 
             let [_, n_outputs] = poses.dims();
             for (crop, outputs) in crops.iter().zip(host_values(&poses).chunks(n_outputs)) {
@@ -66,7 +70,8 @@ impl<'a> HeldOut<'a> {
                 pose_errors.push(&hypotheses, &crop.crop_from_world);
             }
         }
-        let mut measurements = pose_errors.measurements();
+        let mut measurements = vec![("held_out_loss", pose_loss + style_loss)];
+        measurements.extend(pose_errors.measurements());
         measurements.push(("style_loss", style_loss));
         measurements
     }

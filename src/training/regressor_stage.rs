@@ -24,7 +24,7 @@ use crate::{
     Result,
     checkpoint::load_regressors,
     data::keyed_rng,
-    regressor::{PoseTarget, Regressors},
+    regressor::Regressors,
     shape_prior::{Generator, ShapePrior},
 };
 
@@ -112,10 +112,7 @@ impl<'a> RegressorStage<'a> {
             .unzip();
         let (styles, poses) = regress(regressors, &values, &truths, device);
         let style_targets = self.styles.of(&truths, device);
-        let pose_targets: Vec<_> = truths
-            .iter()
-            .map(|crop| PoseTarget::new(&crop.crop_from_world, crop.focal_ratio))
-            .collect();
+        let pose_targets: Vec<_> = truths.iter().map(Crop::pose_target).collect();
         let n_decoded = self.config.regressors.decoded_shapes.min(truths.len());
         let mut terms = vec![("pose", regressors.pose.loss(poses, &pose_targets))];
         if n_decoded > 0 {

@@ -7,6 +7,7 @@ use std::{
 };
 
 use burn::{
+    grad_clipping::GradientClippingConfig,
     module::Module,
     optim::{AdamConfig, GradientsParams, ModuleOptimizer},
     tensor::Tensor,
@@ -35,12 +36,15 @@ impl Stage<'_> {
     /// Where the last run was interrupted, or the start, with `module`.
     pub fn resume<M: Module>(&self, module: M) -> Result<Progress<M>> {
         // Gradients of distances in world units are small; Burn's own epsilon would hide them.
-        let optimizer = AdamConfig::new().with_epsilon(1e-8).init();
-        let start = Progress { step: 0, elapsed: Duration::ZERO, module, optimizer };
+        let longest = self.schedule.gradient_norm;
+        let clipping = (longest > 0.0).then_some(GradientClippingConfig::Norm(longest));
+        let optimizer = AdamConfig::new().with_epsilon(1e-8).with_grad_clipping(clipping).init();
+        let start = Progress { step: 0, elapsed: Duration::ZERO, module, optimizer, best: None };
         start.resume(&self.checkpoint_path())
     }
 
-    /// Trains from there to the end.
+    /// Trains from there to the end, or until patience does, and returns what did best on held-out
+    /// shapes: what has the least of the first measurement of `validate`.
     ///
     /// `loss` sees the module and the number of the step, on which alone its batch depends, so an
     /// interrupted run takes the same steps as an uninterrupted one.
@@ -70,21 +74,40 @@ impl Stage<'_> {
                 values.push(("learning_rate", rate));
                 metrics.append(progress.step, progress.elapsed, &values)?;
             }
-            if progress.step == steps {
-                break;
-            }
-            if progress.step.is_multiple_of(validate_every) {
+            if progress.step.is_multiple_of(validate_every) || progress.step == steps {
                 let values = validate(&progress.module);
                 let line = format!("{} step {}: {}", self.name, progress.step, summary(&values));
                 bar.suspend(|| eprintln!("{line}"));
                 metrics.append(progress.step, progress.elapsed, &values)?;
+                if !progress.keep_if_best(values[0].1, &self.checkpoint_path())?
+                    && self.is_out_of_patience(&progress)
+                {
+                    break;
+                }
             }
             if progress.step.is_multiple_of(checkpoint_every) {
                 progress.save(&self.checkpoint_path())?;
             }
         }
         bar.finish_and_clear();
-        Ok(progress.module)
+        self.report_best(&progress);
+        progress.into_best(&self.checkpoint_path())
+    }
+
+    fn is_out_of_patience<M>(&self, progress: &Progress<M>) -> bool {
+        let Schedule { patience, validate_every, .. } = *self.schedule;
+        let best_step = progress.best.as_ref().map_or(progress.step, |best| best.step);
+        patience > 0 && progress.step - best_step >= patience * validate_every
+    }
+
+    fn report_best<M>(&self, progress: &Progress<M>) {
+        if let Some(best) = progress.best.as_ref().filter(|best| best.step < progress.step) {
+            let step = progress.step;
+            eprintln!(
+                "{}: the weights of step {} did better than step {step}'s",
+                self.name, best.step
+            );
+        }
     }
 
     /// Records what came out, once it is saved: there is nothing to resume any more.
@@ -136,4 +159,67 @@ fn summary(measurements: &Measurements) -> String {
     let parts: Vec<String> =
         measurements.iter().map(|(name, value)| format!("{name} {value:.4}")).collect();
     parts.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use burn::{
+        nn::{Linear, LinearConfig},
+        tensor::Device,
+    };
+    use std::cell::RefCell;
+
+    /// Trains a layer, whose squared weights are the loss, on a scale of each step's own. Its weights at
+    /// each measurement, which says what `scores` do, and at the end.
+    fn train(schedule: Schedule, scales: &[f64], scores: &[f64]) -> (Vec<Vec<f32>>, Vec<f32>) {
+        let folder = tempfile::tempdir().unwrap();
+        let stage = Stage { name: "test", schedule: &schedule, out: folder.path() };
+        let device = Device::flex().autodiff();
+        device.seed(0);
+        let weights = |layer: &Linear| host_values(&layer.weight.val());
+        let measured = RefCell::new(Vec::new());
+        let loss = |layer: &Linear, step: usize| {
+            let squared = layer.weight.val().square().sum();
+            Ok(vec![("loss", squared * scales[step % scales.len()])])
+        };
+        let measure = |layer: &Linear| {
+            measured.borrow_mut().push(weights(layer));
+            vec![("score", scores[measured.borrow().len() - 1])]
+        };
+        let layer = LinearConfig::new(3, 2).with_bias(false).init(&device);
+        let trained = stage.train(stage.resume(layer).unwrap(), loss, measure).unwrap();
+        (measured.into_inner(), weights(&trained))
+    }
+
+    fn schedule(steps: usize) -> Schedule {
+        Schedule { steps, warm_up: 1, validate_every: 1, ..Schedule::default() }
+    }
+
+    #[test]
+    fn what_does_best_on_held_out_shapes_is_kept() {
+        let (measured, trained) = train(schedule(4), &[1.0], &[3.0, 1.0, 2.0, 1.5]);
+        assert_eq!(trained, measured[1]);
+        assert_ne!(trained, measured[3]);
+    }
+
+    #[test]
+    fn patience_ends_a_stage_that_no_longer_improves() {
+        let scores = [3.0, 1.0, 2.0, 2.0, 2.0, 2.0];
+        let (measured, trained) = train(Schedule { patience: 2, ..schedule(6) }, &[1.0], &scores);
+        assert_eq!((measured.len(), trained), (4, measured[1].clone()));
+    }
+
+    #[test]
+    fn clipped_gradients_are_as_long_whatever_the_loss() {
+        let clipped = Schedule { gradient_norm: 0.01, ..schedule(3) };
+        let trained = |schedule: &Schedule, scales: &[f64]| {
+            train(schedule.clone(), scales, &[3.0, 2.0, 1.0]).1
+        };
+        let distance = |schedule: &Schedule| {
+            let [even, uneven] = [[1.0; 3], [1.0, 1000.0, 1.0]].map(|s| trained(schedule, &s));
+            even.iter().zip(uneven).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+        };
+        assert!(distance(&clipped) < 1e-6 && distance(&schedule(3)) > 1e-5);
+    }
 }
