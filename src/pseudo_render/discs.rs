@@ -4,7 +4,7 @@
 //! ellipse on the image plane with an inverse depth and a slope, and compares exactly with its
 //! neighbours on the same surface, however steep that is.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector2, Vector3};
 use rayon::prelude::*;
 
 use super::{
@@ -15,6 +15,8 @@ use crate::camera::{Intrinsics, NEAR};
 
 /// Cells that a disc reaches at most to each side: a bound, for views from within the cloud.
 const MAX_REACH: f32 = 24.0;
+/// Cells that are compared with a disc side by side.
+const LANES: usize = 4;
 
 /// For each view, the points that no disc hides. One cloud, in the world frame.
 pub(super) fn visible_points(
@@ -36,9 +38,11 @@ pub(super) fn visible_points(
 }
 
 /// A view and the plane of its cells.
-struct View<'a> {
-    camera_from_world: &'a Isometry3<f32>,
-    intrinsics: &'a Intrinsics,
+struct View {
+    rotation: Matrix3<f32>,
+    translation: Vector3<f32>,
+    focal: Vector2<f32>,
+    center: Vector2<f32>,
     size: [f32; 2],
     /// Side of a cell, in pixels.
     cell: f32,
@@ -48,19 +52,19 @@ struct View<'a> {
 
 /// A disc in an image, around its point's pixel.
 struct Disc {
-    pixel: [f32; 2],
+    pixel: Vector2<f32>,
     /// 1/z at the pixel, and how it changes along u and v.
     inverse_depth: f32,
-    slope: [f32; 2],
+    slope: Vector2<f32>,
     /// m of the ellipse m_0 δu² + 2 m_1 δu δv + m_2 δv² ≤ 1, and how far it reaches along u and v.
     ellipse: [f32; 3],
-    reach: [f32; 2],
+    reach: Vector2<f32>,
 }
 
-impl<'a> View<'a> {
+impl View {
     fn new(
-        camera_from_world: &'a Isometry3<f32>,
-        intrinsics: &'a Intrinsics,
+        camera_from_world: &Isometry3<f32>,
+        intrinsics: &Intrinsics,
         size: [usize; 2],
         surface: &Surface,
         points: &[Point3<f32>],
@@ -77,7 +81,10 @@ impl<'a> View<'a> {
         // Of NaN and of clouds of no extent, `max` keeps the other.
         let cell = (config.disc_cell * spacing).max(FINEST_CELL).min(coarsest);
         let [columns, rows] = size.map(|side| (side / cell).ceil() as usize);
-        Self { camera_from_world, intrinsics, size, cell, columns, rows }
+        let rotation = camera_from_world.rotation.to_rotation_matrix().into_inner();
+        let translation = camera_from_world.translation.vector;
+        let [focal, center] = [intrinsics.focal, intrinsics.center].map(Vector2::from);
+        Self { rotation, translation, focal, center, size, cell, columns, rows }
     }
 
     fn visible_points(
@@ -86,7 +93,7 @@ impl<'a> View<'a> {
         surface: &Surface,
         config: &PseudoRenderConfig,
     ) -> Vec<u32> {
-        let mut plane = vec![0.0f32; self.columns * self.rows];
+        let mut plane = vec![0.0f32; self.stride() * self.rows];
         // For each point, its cell and the inverse depth of its disc there.
         let mut found = vec![(0, 0.0f32); points.len()];
         for ((point, patch), found) in points.iter().zip(&surface.patches).zip(&mut found) {
@@ -104,76 +111,85 @@ impl<'a> View<'a> {
 
     /// `None` out of the frame or behind the camera.
     fn disc(&self, point: &Point3<f32>, patch: &Patch, radius: f32) -> Option<Disc> {
-        let at = self.camera_from_world * point;
-        let Intrinsics { focal, center } = self.intrinsics;
-        let pixel = [0, 1].map(|axis| at[axis] / at.z * focal[axis] + center[axis]);
+        let at = self.rotation * point.coords + self.translation;
+        let inverse_depth = at.z.recip();
+        let pixel = at.xy().component_mul(&self.focal) * inverse_depth + self.center;
         let inside = |axis: usize| pixel[axis] >= 0.0 && pixel[axis] < self.size[axis];
         if !(at.z > NEAR && inside(0) && inside(1)) {
             return None;
         }
-        let normal = self.camera_from_world.rotation * patch.normal;
-        let distance = normal.dot(&at.coords);
-        let slope = [normal.x / focal[0] / distance, normal.y / focal[1] / distance];
+        let normal = self.rotation * patch.normal;
+        let slope = normal.xy().component_div(&self.focal) / normal.dot(&at);
         // ∂X/∂u and ∂X/∂v along the plane.
-        let along = [0, 1].map(|axis| {
-            let mut lateral = at.coords * (-at.z * slope[axis]);
-            lateral[axis] += at.z / focal[axis];
-            lateral
-        });
+        let along_u = Vector3::new(at.z / self.focal.x, 0.0, 0.0) - at * (at.z * slope.x);
+        let along_v = Vector3::new(0.0, at.z / self.focal.y, 0.0) - at * (at.z * slope.y);
         let scale = (radius * patch.spacing).powi(-2);
-        let ellipse = [along[0].dot(&along[0]), along[0].dot(&along[1]), along[1].dot(&along[1])]
-            .map(|entry| scale * entry);
+        let [uu, uv, vv] = [along_u.norm_squared(), along_u.dot(&along_v), along_v.norm_squared()];
         // Of a Gram matrix, without the cancellation that a disc seen edge-on would suffer from.
-        let determinant = (scale * along[0].cross(&along[1]).norm()).powi(2);
-        let reach = [ellipse[2] / determinant, ellipse[0] / determinant]
-            .map(|squared| squared.sqrt().min(MAX_REACH * self.cell));
-        let inverse_depth = at.z.recip();
-        match reach.iter().chain(&slope).all(|value| value.is_finite()) {
-            true => Some(Disc { pixel, inverse_depth, slope, ellipse, reach }),
-            // Seen edge-on, or of no extent: only the point itself is left.
-            false => Some(Disc {
+        let determinant = scale * along_u.cross(&along_v).norm_squared();
+        let reach = Vector2::new((vv / determinant).sqrt(), (uu / determinant).sqrt());
+        Some(match (reach.sum() + slope.sum()).is_finite() {
+            true => Disc {
                 pixel,
                 inverse_depth,
-                slope: [0.0; 2],
+                slope,
+                ellipse: [scale * uu, scale * uv, scale * vv],
+                reach: reach.inf(&Vector2::repeat(MAX_REACH * self.cell)),
+            },
+            // Seen edge-on, or of no extent: only the point itself is left.
+            false => Disc {
+                pixel,
+                inverse_depth,
+                slope: Vector2::zeros(),
                 ellipse: [0.0; 3],
-                reach: [0.0; 2],
-            }),
-        }
+                reach: Vector2::zeros(),
+            },
+        })
     }
 
     /// Leaves the disc on the plane; returns the cell of its point, and its inverse depth there.
     fn splat(&self, disc: &Disc, plane: &mut [f32]) -> (usize, f32) {
-        let cells = [self.columns, self.rows];
-        let own = [0, 1].map(|axis| ((disc.pixel[axis] / self.cell) as usize).min(cells[axis] - 1));
-        let offset = |axis: usize, cell: usize| (cell as f32 + 0.5) * self.cell - disc.pixel[axis];
-        let range = |axis: usize| {
-            let low = (disc.pixel[axis] - disc.reach[axis]) / self.cell - 0.5;
-            let high = (disc.pixel[axis] + disc.reach[axis]) / self.cell - 0.5;
-            (low.ceil().max(0.0) as usize, (high + 1.0).max(0.0).min(cells[axis] as f32) as usize)
-        };
-        let (first_row, last_row) = range(1);
-        let (first, last) = range(0);
-        for row in first_row..last_row {
+        let Disc { pixel, inverse_depth, slope, ellipse: [uu, uv, vv], reach } = *disc;
+        let offset = |axis: usize, cell: usize| (cell as f32 + 0.5) * self.cell - pixel[axis];
+        // Cells whose centres lie within reach.
+        let low = (pixel - reach) / self.cell;
+        let high = (pixel + reach) / self.cell;
+        let first_cell = |axis: usize| (low[axis] + 0.5).max(0.0) as usize;
+        let end_cell = |axis: usize| (high[axis] + 0.5) as usize;
+        let (first, end) = (first_cell(0), end_cell(0).min(self.columns));
+        for row in first_cell(1)..end_cell(1).min(self.rows) {
             let dv = offset(1, row);
-            let (start, middle) = (disc.slope[1] * dv, 2.0 * disc.ellipse[1] * dv);
-            let room = 1.0 - disc.ellipse[2] * dv * dv;
-            for column in first..last {
-                let du = offset(0, column);
-                if (disc.ellipse[0] * du + middle) * du <= room {
-                    let value = disc.inverse_depth + start + disc.slope[0] * du;
-                    let kept = &mut plane[row * self.columns + column];
-                    *kept = kept.max(value);
+            let (start, middle) = (inverse_depth + slope.y * dv, 2.0 * uv * dv);
+            let room = 1.0 - vv * dv * dv;
+            // Several columns side by side, of which those beyond the ellipse keep what they have.
+            let start_cell = row * self.stride() + first;
+            let n_chunks = end.saturating_sub(first).div_ceil(LANES);
+            let cells = plane[start_cell..][..n_chunks * LANES].as_chunks_mut::<LANES>().0;
+            for (chunk, kept) in cells.iter_mut().enumerate() {
+                let du = offset(0, first + chunk * LANES);
+                for (lane, kept) in kept.iter_mut().enumerate() {
+                    let du = du + lane as f32 * self.cell;
+                    let value = start + slope.x * du;
+                    let covered = (uu * du + middle) * du <= room;
+                    let value = if covered { value } else { 0.0 };
+                    *kept = if value > *kept { value } else { *kept };
                 }
             }
         }
         // Its own cell's centre may lie beyond the disc, which then counts at its nearest edge.
+        let cell = |axis: usize, count: usize| ((pixel[axis] / self.cell) as usize).min(count - 1);
+        let own = [cell(0, self.columns), cell(1, self.rows)];
         let [du, dv] = [offset(0, own[0]), offset(1, own[1])];
-        let [a, b, c] = disc.ellipse;
-        let beyond = (a * du * du + 2.0 * b * du * dv + c * dv * dv).max(1.0).sqrt();
-        let change = (disc.slope[0] * du + disc.slope[1] * dv) / beyond;
-        let (cell, value) = (own[1] * self.columns + own[0], disc.inverse_depth + change);
+        let beyond = (uu * du * du + 2.0 * uv * du * dv + vv * dv * dv).max(1.0).sqrt();
+        let value = inverse_depth + (slope.x * du + slope.y * dv) / beyond;
+        let cell = own[1] * self.stride() + own[0];
         plane[cell] = plane[cell].max(value);
         (cell, value)
+    }
+
+    /// Cells of the plane from one row to the next: room for the lanes beyond the last column.
+    fn stride(&self) -> usize {
+        self.columns + LANES
     }
 }
 

@@ -33,20 +33,31 @@ impl Surface {
             let patch = Patch { normal: Vector3::zeros(), spacing: 0.0 };
             return Self { patches: vec![patch; points.len()], spacing: 0.0 };
         };
-        let mut moments = vec![Moments::default(); frame.len()];
         let voxels: Vec<usize> = points.iter().map(|point| frame.voxel(point)).collect();
+        let (slots, occupied) = slots(&voxels, frame.len());
+        let mut moments = vec![Moments::default(); occupied.len() + 1];
         for (point, &voxel) in points.iter().zip(&voxels) {
-            moments[voxel].add_point((point - frame.origin) / frame.size);
+            moments[slots[voxel] as usize].add_point((point - frame.origin) / frame.size);
         }
-        let mut occupied = voxels.clone();
-        occupied.sort_unstable();
-        occupied.dedup();
         let fitted: Vec<Patch> =
-            occupied.par_iter().map(|&voxel| frame.patch(&moments, voxel)).collect();
-        let patch = |voxel| fitted[occupied.binary_search(voxel).expect("it is occupied")];
+            occupied.par_iter().map(|&voxel| frame.patch(&moments, &slots, voxel)).collect();
+        let patch = |&voxel: &usize| fitted[slots[voxel] as usize - 1];
         let spacing = frame.size / VOXEL_SIZE;
         Self { patches: voxels.iter().map(patch).collect(), spacing }
     }
+}
+
+/// Numbers the occupied of `n` voxels from one; zero is for those that are empty. Returns each voxel's
+/// number, and the voxels in the order of theirs.
+fn slots(voxels: &[usize], n: usize) -> (Vec<u32>, Vec<usize>) {
+    let (mut slots, mut occupied) = (vec![0; n], Vec::new());
+    for &voxel in voxels {
+        if slots[voxel] == 0 {
+            occupied.push(voxel);
+            slots[voxel] = occupied.len() as u32;
+        }
+    }
+    (slots, occupied)
 }
 
 /// A grid of voxels with a margin of one all round, so that every window is whole.
@@ -70,9 +81,8 @@ impl Voxels {
         // Voxels that hold several points each tell the area, and with it the spacing.
         let n_points = points.len() as f32;
         let coarse = Self::of_size(4.0 * diagonal / n_points.sqrt(), low, high, points.len());
-        let mut occupied: Vec<usize> = points.iter().map(|point| coarse.voxel(point)).collect();
-        occupied.sort_unstable();
-        occupied.dedup();
+        let voxels: Vec<usize> = points.iter().map(|point| coarse.voxel(point)).collect();
+        let (_, occupied) = slots(&voxels, coarse.len());
         let area = AREA_PER_VOXEL * occupied.len() as f32 * coarse.size * coarse.size;
         let size = VOXEL_SIZE * (area / n_points).sqrt();
         Some(Self::of_size(size, low, high, points.len()))
@@ -101,13 +111,14 @@ impl Voxels {
     }
 
     /// The plane through the points of the window around a voxel.
-    fn patch(&self, moments: &[Moments], voxel: usize) -> Patch {
+    fn patch(&self, moments: &[Moments], slots: &[u32], voxel: usize) -> Patch {
         let [_, rows, columns] = self.counts;
         let mut window = Moments::default();
         for i in 0..3 {
             for j in 0..3 {
                 let first = voxel + (i * rows + j) * columns - (rows + 1) * columns - 1;
-                moments[first..first + 3].iter().for_each(|moments| window.add(moments));
+                let slots = slots[first..first + 3].iter().filter(|&&slot| slot > 0);
+                slots.for_each(|&slot| window.add(&moments[slot as usize]));
             }
         }
         let eigen = window.covariance().symmetric_eigen();
