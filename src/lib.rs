@@ -11,6 +11,7 @@ pub mod regressor;
 pub mod pseudo_render;
 pub mod sampling;
 pub mod nearest_neighbours;
+pub mod pixel_grid;
 pub mod chamfer;
 pub mod silhouette;
 pub mod loss;

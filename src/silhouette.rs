@@ -46,6 +46,11 @@ impl Silhouette {
     /// The weight of an outline's sample, where a pixel's is 1: they lie that much closer.
     pub const OUTLINE_WEIGHT: f32 = 1.0 / SAMPLES_PER_SEGMENT as f32;
 
+    /// [width, height] of the frame, in pixels.
+    pub fn size(&self) -> [usize; 2] {
+        [self.coverage.width() as usize, self.coverage.height() as usize]
+    }
+
     /// The centre of the silhouette's pixel nearest to a location: its own pixel's, when inside.
     pub fn nearest_pixel(&self, location: [f32; 2]) -> [f32; 2] {
         let [u, v] = location;
