@@ -2,7 +2,7 @@
 
 use burn::tensor::{Tensor, TensorData};
 
-use crate::{host::index_tensor, nearest_neighbours::NearestNeighbours, silhouette::Silhouette};
+use crate::{pixel_grid::PixelGrid, silhouette::Silhouette};
 
 /// Charbonnier's loss of a squared residual, 2σ²(√(1 + r²/σ²) − 1): r² near zero, 2σ|r| far out.
 pub fn charbonnier<const D: usize>(squared: Tensor<D>, scale: f32) -> Tensor<D> {
@@ -49,9 +49,9 @@ pub fn silhouette_pairs(
             pairs.push(SilhouettePair { point_idx, target, weight, tolerance });
         }
     };
-    let search = NearestNeighbours::in_plane(visible.iter().map(|&i| projected[i as usize]));
+    let grid = PixelGrid::new(silhouette.size(), visible.iter().map(|&i| projected[i as usize]));
     let mut cover = |location: [f32; 2], weight: f32| {
-        pair(visible[search.nearest_pixel(location) as usize], location, weight, coverage);
+        pair(visible[grid.nearest(location) as usize], location, weight, coverage);
     };
     silhouette.pixels.iter().for_each(|&pixel| cover(pixel, of_pixel));
     if matching.to_outline {
@@ -72,30 +72,18 @@ pub fn silhouette_pairs(
 /// The weighted squares of what distances exceed their tolerance by, over all pairs, in pixels², on
 /// the graph: `[1]`.
 ///
-/// `pixels` are the projected points `[b, n, 2]`; each list of pairs comes with its row of them.
-pub fn silhouette_distances(
-    pixels: Tensor<3>,
-    pairs: &[(usize, Vec<SilhouettePair>)],
-) -> Tensor<1> {
-    let [b, n, _] = pixels.dims();
-    let n_pairs: usize = pairs.iter().map(|(_, pairs)| pairs.len()).sum();
+/// `pixels` `[pairs, 2]` is where each pair's point lands.
+pub fn silhouette_distances(pixels: Tensor<2>, pairs: &[SilhouettePair]) -> Tensor<1> {
     let device = pixels.device().inner();
-    if n_pairs == 0 {
-        return Tensor::zeros([1], &device);
-    }
-    let all = || pairs.iter().flat_map(|(row, pairs)| pairs.iter().map(move |pair| (row, pair)));
-    let rows = all().map(|(row, pair)| (row * n + pair.point_idx as usize) as i64);
-    let rows = index_tensor(rows.collect(), &pixels);
     let column = |values: Vec<f32>| {
-        let columns = values.len() / n_pairs;
-        Tensor::<2>::from_data(TensorData::new(values, [n_pairs, columns]), &device)
+        let columns = values.len() / pairs.len();
+        Tensor::<2>::from_data(TensorData::new(values, [pairs.len(), columns]), &device)
     };
-    let targets = column(all().flat_map(|(_, pair)| pair.target).collect());
-    let weights = column(all().map(|(_, pair)| pair.weight).collect());
-    let tolerances = column(all().map(|(_, pair)| pair.tolerance).collect());
+    let targets = column(pairs.iter().flat_map(|pair| pair.target).collect());
+    let weights = column(pairs.iter().map(|pair| pair.weight).collect());
+    let tolerances = column(pairs.iter().map(|pair| pair.tolerance).collect());
 
-    let offsets = pixels.reshape([b * n, 2]).select(0, rows) - targets;
-    let squared = offsets.square().sum_dim(1); // [pairs, 1]
+    let squared = (pixels - targets).square().sum_dim(1); // [pairs, 1]
     // (d − τ)² = d² − τ (2 d − τ), whose derivative stays finite where τ = 0 and d = 0.
     let distances = (squared.clone() + tolerances.clone().equal_elem(0.0).float()).sqrt();
     let excess = squared - (distances * 2.0 - tolerances.clone()) * tolerances;

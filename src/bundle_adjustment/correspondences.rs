@@ -2,6 +2,7 @@
 //! view sees, which colours may be compared, which silhouette pixel belongs to which point.
 
 use burn::tensor::Tensor;
+use nalgebra::{Isometry3, Vector2, Vector3};
 use rayon::prelude::*;
 
 use super::{
@@ -9,8 +10,8 @@ use super::{
     observations::Observations,
 };
 use crate::{
-    camera::{Pose, Projection},
-    host::host_pixels,
+    camera::{Intrinsics, NEAR, Pose},
+    host::host_points,
     loss::{SilhouetteMatching, SilhouettePair, silhouette_pairs},
     pseudo_render::visible_points,
 };
@@ -19,6 +20,8 @@ use crate::{
 pub struct Correspondences {
     /// The frames, the reference first.
     pub frames: Vec<usize>,
+    /// The cloud, in the world frame.
+    pub points: Vec<[f32; 3]>,
     /// Where every point lands in each of them, in pixels.
     pub pixels: Vec<Vec<[f32; 2]>>,
     /// The points that each of them sees.
@@ -30,19 +33,21 @@ pub struct Correspondences {
 }
 
 impl Correspondences {
-    /// Of a cloud `[1, n, 3]` seen from `poses`, one for each of `frames`; `projection` is where it
-    /// lands in them, `[1 + t, n, …]`.
+    /// Of a cloud `[1, n, 3]` seen from `poses`, one for each of `frames`.
     pub fn new(
         observations: &Observations,
         frames: Vec<usize>,
-        (points_in_world, poses, projection): (Tensor<3>, &Pose, &Projection),
+        (points_in_world, poses): (&Tensor<3>, &Pose),
         config: &ObjectiveConfig,
         level: usize,
     ) -> Self {
         let Observations { intrinsics, size, .. } = observations;
-        let visible =
-            visible_points(points_in_world, poses, intrinsics, *size, &config.pseudo_render);
-        let pixels = host_pixels(&projection.pixels);
+        let points = host_points(points_in_world);
+        let cloud = points_in_world.clone();
+        let visible = visible_points(cloud, poses, intrinsics, *size, &config.pseudo_render);
+        let poses = poses.to_isometries();
+        let pixels: Vec<_> =
+            poses.par_iter().map(|pose| projected(&points, pose, intrinsics)).collect();
         let comparable = (1..frames.len())
             .into_par_iter()
             .map(|t| {
@@ -50,13 +55,30 @@ impl Correspondences {
             })
             .collect();
         let pairs = pairs(observations, &frames, &pixels, &visible, config, level);
-        Self { frames, pixels, visible, comparable, pairs }
+        Self { frames, points, pixels, visible, comparable, pairs }
     }
 
     /// How many colours are compared, all targets together; at least one.
     pub fn n_compared(&self) -> f32 {
         self.comparable.iter().flatten().sum::<f32>().max(1.0)
     }
+}
+
+/// Where every point lands in one view, as [`Intrinsics::project`] has it.
+fn projected(
+    points: &[[f32; 3]],
+    camera_from_world: &Isometry3<f32>,
+    intrinsics: &Intrinsics,
+) -> Vec<[f32; 2]> {
+    let rotation = camera_from_world.rotation.to_rotation_matrix().into_inner();
+    let translation = camera_from_world.translation.vector;
+    let [focal, center] = [intrinsics.focal, intrinsics.center].map(Vector2::from);
+    let pixel = |&point: &[f32; 3]| {
+        let in_camera = rotation * Vector3::from(point) + translation;
+        let slopes = in_camera.xy() / in_camera.z.max(NEAR);
+        (slopes.component_mul(&focal) + center).into()
+    };
+    points.iter().map(pixel).collect()
 }
 
 /// Whether each point that the reference sees may be compared with one target.

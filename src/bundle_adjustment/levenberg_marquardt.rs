@@ -3,17 +3,14 @@
 //! The paper sets Gauss–Newton aside because ∂X/∂s hides in the network. A batch of decoded
 //! neighbours gives it by differences: one row of the batch for each direction.
 
-use burn::tensor::{Tensor, TensorData};
 use nalgebra::{DVector, Isometry3};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Progress, Status,
-    linearisation::{Linearisation, NormalEquations},
-    objective::{Evaluation, Objective},
+    Progress, Status, correspondences::Correspondences, linearisation::Linearisation,
+    normal_equations::NormalEquations, objective::Objective, shape_jacobian::ShapeJacobian,
     unknowns::Unknowns,
 };
-use crate::host::host_points;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -46,10 +43,6 @@ impl Default for LevenbergMarquardtConfig {
 const DAMPING: f64 = 1e-2;
 const DAMPING_LIMITS: [f64; 2] = [1e-6, 1e4];
 const DAMPING_FACTORS: [f64; 2] = [6.0, 0.3];
-/// Step of the style for ∂X/∂s, in standard deviations.
-const STYLE_STEP: f32 = 0.05;
-/// How far any direction may be from where ∂X/∂s was taken, in standard deviations.
-const STYLE_TOLERANCE: f32 = 0.2;
 /// Longest step of a rotation (radians), and of a style direction (standard deviations).
 const MAX_TURN: f64 = 0.2;
 const MAX_STYLE_STEP: f64 = 0.7;
@@ -63,7 +56,7 @@ pub fn run(
     progress: &mut Progress,
 ) -> Status {
     let mut damping = DAMPING;
-    let mut current = objective.value(unknowns, level);
+    let (mut current, mut matches) = objective.value(unknowns, level);
     let mut shape = ShapeJacobian::default();
     for iteration in 0..config.iterations {
         progress.report("joint", &current, unknowns);
@@ -73,20 +66,20 @@ pub fn run(
         let relative_only = level == 0 && iteration < config.relative_first;
         let n_directions = config.n_directions.min(unknowns.style().len());
         shape.refresh(objective, unknowns, n_directions);
-        let model = normal_equations(objective, unknowns, level, &shape, config);
-        let Some((next, value)) = damped_step(
-            objective,
-            unknowns,
-            level,
-            &model,
-            current.objective,
-            &mut damping,
-            relative_only,
-        ) else {
-            break;
+        let model = normal_equations(objective, unknowns, level, &shape, &matches, config);
+        let step = |damping| match relative_only {
+            true => model.relative_step(damping),
+            false => model.step(damping),
         };
+        let better = |damping| {
+            let step = limited(step(damping)?, n_directions);
+            let next = unknowns.stepped(step.as_slice(), n_directions);
+            let (value, matches) = objective.value(&next, level);
+            (value.objective < current.objective).then_some((next, value, matches))
+        };
+        let Some((next, value, next_matches)) = damped_step(better, &mut damping) else { break };
         let gain = current.objective - value.objective;
-        (*unknowns, current) = (next, value);
+        (*unknowns, current, matches) = (next, value, next_matches);
         if !relative_only && gain <= config.relative_tolerance * current.objective {
             break;
         }
@@ -95,32 +88,12 @@ pub fn run(
     Status::Converged
 }
 
-/// Raises the damping until a step lowers the objective; `None` when none does.
-fn damped_step(
-    objective: &Objective,
-    unknowns: &Unknowns,
-    level: usize,
-    model: &NormalEquations,
-    current: f64,
-    damping: &mut f64,
-    relative_only: bool,
-) -> Option<(Unknowns, Evaluation)> {
-    let n_directions = model.gradient.len() - 6 * unknowns.n_frames();
+/// Raises the damping until a step is `better`; `None` when none is.
+fn damped_step<T>(better: impl Fn(f64) -> Option<T>, damping: &mut f64) -> Option<T> {
     while *damping <= DAMPING_LIMITS[1] {
-        let mut hessian = model.hessian.clone();
-        for i in 0..hessian.nrows() {
-            let held = relative_only && i < 6 + n_directions;
-            hessian[(i, i)] += if held { 1e12 } else { *damping * hessian[(i, i)] + 1e-9 };
-        }
-        let step = hessian.cholesky().map(|cholesky| -cholesky.solve(&model.gradient));
-        let trial =
-            step.map(|step| unknowns.stepped(limited(step, n_directions).as_slice(), n_directions));
-        if let Some(trial) = trial {
-            let value = objective.value(&trial, level);
-            if value.objective < current {
-                *damping = (*damping * DAMPING_FACTORS[1]).max(DAMPING_LIMITS[0]);
-                return Some((trial, value));
-            }
+        if let Some(found) = better(*damping) {
+            *damping = (*damping * DAMPING_FACTORS[1]).max(DAMPING_LIMITS[0]);
+            return Some(found);
         }
         *damping *= DAMPING_FACTORS[0];
     }
@@ -149,64 +122,28 @@ fn normal_equations(
     unknowns: &Unknowns,
     level: usize,
     shape: &ShapeJacobian,
+    matches: &Correspondences,
     config: &LevenbergMarquardtConfig,
 ) -> NormalEquations {
     let poses: Vec<Isometry3<f64>> =
         unknowns.camera_from_world(&objective.device).iter().map(|pose| pose.cast()).collect();
-    let matches = objective.correspondences(unknowns, level);
     let linearisation = Linearisation {
         observations: objective.observations,
         config: objective.config,
         level,
-        matches: &matches,
+        matches,
         poses: &poses,
-        points: &shape.points,
-        style_derivatives: &shape.derivatives,
+        shape,
         max_residuals: config.max_residuals,
     };
     let mut model = linearisation.normal_equations();
     let style = &unknowns.values[unknowns.style()];
     let weight = f64::from(objective.config.style_weight) / style.len().max(1) as f64;
-    for (i, &value) in style.iter().take(shape.derivatives.len()).enumerate() {
-        model.hessian[(6 + i, 6 + i)] += weight;
-        model.gradient[6 + i] += weight * value;
+    for (i, &value) in style.iter().take(shape.n_directions()).enumerate() {
+        model.shared[(6 + i, 6 + i)] += weight;
+        model.shared_gradient[6 + i] += weight * value;
     }
     model
-}
-
-/// The cloud, and ∂X/∂s at a style nearby.
-#[derive(Default)]
-struct ShapeJacobian {
-    /// Where the derivatives were taken.
-    style: Vec<f32>,
-    points: Vec<[f32; 3]>,
-    derivatives: Vec<Vec<[f32; 3]>>,
-}
-
-impl ShapeJacobian {
-    /// Decodes the cloud; the derivatives, too, when the style has moved on.
-    fn refresh(&mut self, objective: &Objective, unknowns: &Unknowns, n_directions: usize) {
-        let style: Vec<f32> = unknowns.values[unknowns.style()].iter().map(|&s| s as f32).collect();
-        let moved = style.iter().zip(&self.style).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-        let n_moved =
-            if self.points.is_empty() || moved > STYLE_TOLERANCE { n_directions } else { 0 };
-        // The style itself, then a row for each direction.
-        let mut rows = style.repeat(1 + n_moved);
-        (0..n_moved).for_each(|i| rows[(1 + i) * style.len() + i] += STYLE_STEP);
-        let rows = TensorData::new(rows, [1 + n_moved, style.len()]);
-        let device = objective.device.clone().inner();
-        let clouds = host_points(&objective.shape.points(Tensor::from_data(rows, &device)));
-        let (points, moved) = clouds.split_at(clouds.len() / (1 + n_moved));
-        self.points = points.to_vec();
-        if n_moved > 0 {
-            let slope = |(a, b): (&[f32; 3], &[f32; 3])| {
-                std::array::from_fn(|i| (a[i] - b[i]) / STYLE_STEP)
-            };
-            let derivative = |cloud: &[[f32; 3]]| cloud.iter().zip(points).map(slope).collect();
-            self.derivatives = moved.chunks(points.len()).map(derivative).collect();
-            self.style = style;
-        }
-    }
 }
 
 #[cfg(test)]
@@ -254,17 +191,19 @@ mod tests {
         shape.refresh(&objective, &unknowns, style.len());
         let config =
             LevenbergMarquardtConfig { max_residuals: usize::MAX / 4, ..Default::default() };
-        let model = normal_equations(&objective, &unknowns, 0, &shape, &config);
+        let (_, matches) = objective.value(&unknowns, 0);
+        let model = normal_equations(&objective, &unknowns, 0, &shape, &matches, &config);
+        let gradient = model.gradient();
 
         let of_graph = objective.evaluate(&unknowns, 0).gradient;
         // [p_0 | Δp_1, Δp_2 | s] there, [p_0 | s | Δp_1, Δp_2] here.
         let in_order = [&of_graph[..6], &of_graph[18..], &of_graph[6..18]].concat();
         let scale = in_order.iter().fold(0.0, |max: f64, g| max.max(g.abs()));
-        for (i, (expected, found)) in in_order.iter().zip(model.gradient.iter()).enumerate() {
+        for (i, (expected, found)) in in_order.iter().zip(gradient.iter()).enumerate() {
             // The style's derivatives are differences over a step that rounding can stand.
             let tolerance = if (6..12).contains(&i) { 1e-2 } else { 1e-4 };
             let error = (expected - 2.0 * found).abs();
-            assert!(error < tolerance * scale, "{in_order:?} is not twice {}", model.gradient);
+            assert!(error < tolerance * scale, "{in_order:?} is not twice {gradient}");
         }
     }
 

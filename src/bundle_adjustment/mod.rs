@@ -2,12 +2,16 @@
 
 pub mod adam;
 pub mod alternating;
+mod color_slope;
 pub mod correspondences;
 pub mod lbfgs;
 pub mod levenberg_marquardt;
 mod linearisation;
+mod normal_equations;
 pub mod objective;
 pub mod observations;
+mod rows;
+mod shape_jacobian;
 pub mod shape_model;
 pub mod unknowns;
 
@@ -191,7 +195,7 @@ pub fn bundle_adjust(
         progress.hypothesis = idx;
         progress.end_stage("initial", &hypotheses[0]);
         let run = Run::new(hypothesis).through_all_levels(&objective, config, &mut progress);
-        let cost = objective.value(&run.unknowns, config.blurs.len() - 1).objective;
+        let cost = objective.value(&run.unknowns, config.blurs.len() - 1).0.objective;
         (cost, run, std::mem::take(&mut progress.stages))
     });
     // NaN is the greatest.

@@ -10,8 +10,9 @@ use super::{
     unknowns::{Leaves, Parameterisation, Unknowns, flatten},
 };
 use crate::{
+    camera::Pose,
     host::index_tensor,
-    loss::{charbonnier, silhouette_distances},
+    loss::{SilhouettePair, charbonnier, silhouette_distances},
     pseudo_render::{Footprint, PseudoRenderConfig},
 };
 
@@ -120,11 +121,11 @@ pub struct Objective<'a> {
     pub device: Device,
 }
 
-/// L_ph and L_CD on the graph, unweighted, and the number of points that the reference sees.
+/// L_ph and L_CD on the graph, unweighted, and what they compare.
 struct Terms {
     photometric: Tensor<1>,
     silhouette: Tensor<1>,
-    n_visible: usize,
+    matches: Correspondences,
 }
 
 /// The objective and its gradient at some unknowns, on the host.
@@ -141,26 +142,7 @@ pub struct Evaluation {
 impl Objective<'_> {
     /// The objective over the reference frame and all targets, on images of one blur level.
     pub fn evaluate(&self, unknowns: &Unknowns, level: usize) -> Evaluation {
-        let targets: Vec<usize> = (1..unknowns.n_frames()).collect();
-        self.evaluate_targets(unknowns, &targets, level)
-    }
-
-    /// [`evaluate`](Self::evaluate) without the gradient, which is left empty.
-    pub fn value(&self, unknowns: &Unknowns, level: usize) -> Evaluation {
-        let device = self.device.clone().inner();
-        Objective { device, ..*self }.evaluate(unknowns, level)
-    }
-
-    /// What the current estimate has compared with what, over all frames.
-    pub fn correspondences(&self, unknowns: &Unknowns, level: usize) -> Correspondences {
-        let leaves = unknowns.leaves(&self.device.clone().inner());
-        let points = self.shape.points(leaves.style.clone()).inner();
-        let poses = unknowns.poses(&leaves);
-        let points_in_camera = poses.camera_from_world(points.clone());
-        let projection = self.observations.intrinsics.project(points_in_camera);
-        let frames = (0..unknowns.n_frames()).collect();
-        let cloud = (points, &poses, &projection);
-        Correspondences::new(self.observations, frames, cloud, self.config, level)
+        self.evaluate_targets(unknowns, &all_targets(unknowns), level)
     }
 
     /// The objective over the reference frame and some targets.
@@ -170,6 +152,22 @@ impl Objective<'_> {
         targets: &[usize],
         level: usize,
     ) -> Evaluation {
+        self.compare(unknowns, targets, level).0
+    }
+
+    /// [`evaluate`](Self::evaluate) without the gradient, which is left empty, and what was compared
+    /// with what: the objective is linearised around that.
+    pub fn value(&self, unknowns: &Unknowns, level: usize) -> (Evaluation, Correspondences) {
+        let device = self.device.clone().inner();
+        Objective { device, ..*self }.compare(unknowns, &all_targets(unknowns), level)
+    }
+
+    fn compare(
+        &self,
+        unknowns: &Unknowns,
+        targets: &[usize],
+        level: usize,
+    ) -> (Evaluation, Correspondences) {
         let leaves = unknowns.leaves(&self.device);
         let points = self.shape.points(leaves.style.clone());
         let terms = self.terms(unknowns, &leaves, points, targets, level);
@@ -181,16 +179,17 @@ impl Objective<'_> {
             let deviation = leaves.style.clone().square().mean();
             objective = objective + deviation * self.config.style_weight;
         }
-        Evaluation {
+        let evaluation = Evaluation {
             objective: scalar(&objective),
             photometric,
             silhouette,
-            n_visible: terms.n_visible,
+            n_visible: terms.matches.visible[0].len(),
             gradient: match objective.is_tracked() {
                 true => flatten(&leaves, &objective.backward()),
                 false => Vec::new(),
             },
-        }
+        };
+        (evaluation, terms.matches)
     }
 
     /// The terms over the reference frame and some targets, for a cloud `[1, n, 3]`.
@@ -205,25 +204,50 @@ impl Objective<'_> {
         let frames: Vec<usize> = std::iter::once(0).chain(targets.iter().copied()).collect();
         let frame_idx = frames.iter().map(|&frame| frame as i64).collect();
         let poses = unknowns.poses(leaves).select(index_tensor(frame_idx, &points_in_world));
-        let points_in_camera = poses.camera_from_world(points_in_world.clone());
-        let projection = self.observations.intrinsics.project(points_in_camera);
-        let cloud = (points_in_world, &poses, &projection);
+        let cloud = (&points_in_world, &poses);
         let matches = Correspondences::new(self.observations, frames, cloud, self.config, level);
-        let pixels = projection.pixels; // [1 + t, n, 2]
         Terms {
-            photometric: self.photometric(&matches, pixels.clone(), level),
-            silhouette: silhouette_distances(pixels, &matches.pairs)
-                / matches.pairs.len().max(1) as f32,
-            n_visible: matches.visible[0].len(),
+            photometric: self.photometric(&matches, cloud, level),
+            silhouette: self.silhouette(&matches, cloud),
+            matches,
         }
     }
 
+    /// L_CD (Eq. 5), over the frames that have a silhouette.
+    fn silhouette(
+        &self,
+        matches: &Correspondences,
+        (points, poses): (&Tensor<3>, &Pose),
+    ) -> Tensor<1> {
+        let of_frame = |(frame, pairs): &(usize, Vec<SilhouettePair>)| {
+            let pose = poses.clone().select(index_tensor(vec![*frame as i64], points));
+            let point_idx = pairs.iter().map(|pair| i64::from(pair.point_idx)).collect();
+            let pixels = self.pixels(points, point_idx, &pose); // [1, pairs, 2]
+            silhouette_distances(pixels.squeeze_dim(0), pairs)
+        };
+        let paired = matches.pairs.iter().filter(|(_, pairs)| !pairs.is_empty());
+        let sum = paired.map(of_frame).reduce(|sum, distances| sum + distances);
+        let sum = sum.unwrap_or_else(|| Tensor::zeros([1], &points.device()));
+        sum / matches.pairs.len().max(1) as f32
+    }
+
+    /// Where some points land in each view, `[views, points, 2]`.
+    fn pixels(&self, points: &Tensor<3>, point_idx: Vec<i64>, poses: &Pose) -> Tensor<3> {
+        let points = points.clone().select(1, index_tensor(point_idx, points));
+        self.observations.intrinsics.project(poses.camera_from_world(points)).pixels
+    }
+
     /// L_ph (Eq. 3), over the points that the reference frame sees.
-    fn photometric(&self, matches: &Correspondences, pixels: Tensor<3>, level: usize) -> Tensor<1> {
-        let [_, n, _] = pixels.dims();
+    fn photometric(
+        &self,
+        matches: &Correspondences,
+        (points, poses): (&Tensor<3>, &Pose),
+        level: usize,
+    ) -> Tensor<1> {
+        let [_, n, _] = points.dims();
         let (n_targets, seen) = (matches.frames.len() - 1, &matches.visible[0]);
         if n_targets == 0 {
-            return Tensor::zeros([1], &pixels.device());
+            return Tensor::zeros([1], &points.device());
         }
         if seen.is_empty() {
             // Nothing to compare is the worst that can be, not the best: all three channels of
@@ -232,11 +256,11 @@ impl Objective<'_> {
                 Reduction::Sum => 3.0 * (n_targets * n) as f32,
                 Reduction::Mean => 3.0,
             };
-            return Tensor::from_floats([worst], &pixels.device());
+            return Tensor::from_floats([worst], &points.device());
         }
+        let pixels = self.pixels(points, seen.iter().map(|&i| i64::from(i)).collect(), poses);
         let images = &self.observations.images[level];
-        let seen_idx = index_tensor(seen.iter().map(|&i| i64::from(i)).collect(), &pixels);
-        let colors = images.sample_bilinear(&matches.frames, pixels.select(1, seen_idx));
+        let colors = images.sample_bilinear(&matches.frames, pixels);
         let residuals = colors.clone().slice(s![0..1]) - colors.slice(s![1..]); // [t, m, 3]
         let mut squared = residuals.square().sum_dim(2).squeeze_dim::<2>(2);
         if self.config.robust_scale > 0.0 {
@@ -249,4 +273,8 @@ impl Objective<'_> {
             Reduction::Mean => sum / matches.n_compared(),
         }
     }
+}
+
+fn all_targets(unknowns: &Unknowns) -> Vec<usize> {
+    (1..unknowns.n_frames()).collect()
 }

@@ -10,7 +10,7 @@ use object_pba::{
     camera::{Intrinsics, Pose},
     chamfer::chamfer_distance,
     data::{ColorImage, ScalarImage},
-    host::host_pixels,
+    host::{host_pixels, index_tensor},
     loss::{SilhouetteMatching, charbonnier, silhouette_distances, silhouette_pairs},
     sampling::ImageTable,
     shape_prior::ShapePriorConfig,
@@ -102,16 +102,16 @@ fn silhouette_distances_to_points() {
     });
     let silhouette = Silhouette::new(&disc).expect("a disc");
     let pixels: Vec<f64> = scattered(2 * 2 * 20, 4).iter().map(|x| 14.0 + 12.0 * x).collect();
-    let everything: Vec<u32> = (0..20).collect();
+    let everything: Vec<u32> = (0..40).collect();
     for (to_outline, tolerances) in [(false, [0.0; 2]), (false, [0.9, 0.6]), (true, [0.3, 0.0])] {
         let matching = SilhouetteMatching { to_outline, weights: [0.3, 0.7], tolerances };
         let distances = |pixels: Tensor<1>| {
-            let pixels = pixels.reshape([2, 20, 2]);
-            let of_frame = |(row, projected): (usize, &Vec<[f32; 2]>)| {
-                (row, silhouette_pairs(&silhouette, projected, &everything, &matching))
-            };
-            let pairs: Vec<_> = host_pixels(&pixels).iter().enumerate().map(of_frame).collect();
-            silhouette_distances(pixels, &pairs)
+            let pixels = pixels.reshape([1, 40, 2]);
+            let projected = &host_pixels(&pixels)[0];
+            let pairs = silhouette_pairs(&silhouette, projected, &everything, &matching);
+            let point_idx = pairs.iter().map(|pair| i64::from(pair.point_idx)).collect();
+            let point_idx = index_tensor(point_idx, &pixels);
+            silhouette_distances(pixels.squeeze_dim::<2>(0).select(0, point_idx), &pairs)
         };
         check_gradient(&pixels, on_graph(distances));
     }
