@@ -154,7 +154,7 @@ fn levenberg_marquardt(bencher: Bencher, iterations: usize) {
     let problem = Problem::new(N_FRAMES, SIZES);
     let lm = LevenbergMarquardtConfig { iterations, relative_first: 0, ..Default::default() };
     let config = BundleAdjustmentConfig { lm, blurs: vec![0.0], ..Default::default() };
-    let starts = [problem.unknowns.clone()];
+    let starts = [problem.unknowns.clone().into()];
     bencher.bench(|| {
         let Problem { sequence, generator, device, .. } = &problem;
         bundle_adjust(sequence, generator, &starts, &config, device, &mut |_, _| ())

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use burn::tensor::Device;
 use object_pba::{
     bundle_adjustment::{
-        BundleAdjustmentConfig, Solver, bundle_adjust,
+        BundleAdjustmentConfig, Hypothesis, Solver, bundle_adjust,
         shape_model::{FreePoints, ShapeModel},
         unknowns::Unknowns,
     },
@@ -77,11 +77,12 @@ fn compare(
     let generator = &prior.shape.generator;
     let n_frames = sequence.frames.len();
     let with_prior = guess.hypotheses(n_frames, config.objective.parameterisation);
-    let cloud = points(generator, &with_prior[0], device);
-    let free: Vec<Unknowns> = with_prior
-        .iter()
-        .map(|start| start.with_style(host_points(&cloud).as_flattened()))
-        .collect();
+    let cloud = points(generator, &with_prior[0].unknowns, device);
+    let free = |start: &Hypothesis| Hypothesis {
+        unknowns: start.unknowns.with_style(host_points(&cloud).as_flattened()),
+        confidence: start.confidence,
+    };
+    let free: Vec<Hypothesis> = with_prior.iter().map(free).collect();
 
     let mut free_config = config.clone();
     free_config.objective.style_weight = 0.0;
@@ -91,12 +92,12 @@ fn compare(
         picture: picture(sequence, shape, unknowns, config, device),
     };
     let adjusted =
-        |shape: &dyn ShapeModel, starts: &[Unknowns], config: &BundleAdjustmentConfig| {
+        |shape: &dyn ShapeModel, starts: &[Hypothesis], config: &BundleAdjustmentConfig| {
             let outcome = bundle_adjust(sequence, shape, starts, config, device, &mut |_, _| {});
             arm(shape, &outcome.unknowns)
         };
     Ok([
-        arm(generator, &with_prior[0]),
+        arm(generator, &with_prior[0].unknowns),
         adjusted(generator, &with_prior, config),
         adjusted(&FreePoints, &free, &free_config),
     ])

@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
 use object_pba::{
     bundle_adjustment::{
-        BundleAdjustmentConfig, Outcome, Solver, Status, Step, unknowns::Unknowns,
+        BundleAdjustmentConfig, HypothesisReport, Outcome, Solver, Status, Step, unknowns::Unknowns,
     },
     checkpoint::Prior,
     data::sequence::Sequence,
@@ -29,7 +29,9 @@ pub struct Report {
     pub n_frames: usize,
     pub device: Backend,
     pub solver: Solver,
+    /// Why the solver stopped on what it found, and on each hypothesis.
     pub status: Status,
+    pub hypotheses: Vec<HypothesisReport>,
 }
 
 /// A finished reconstruction, with all that figures are made from.
@@ -68,6 +70,9 @@ pub fn run(sequence: &Path, out: &Path, input: &Input, options: &Options) -> Res
     println!("  cloud.png        the point cloud from the reference camera and around it");
     println!("  points.ply       the cloud, coloured where it was seen");
     println!("  transforms.json  the camera of every frame");
+    println!(
+        "  uncertainty.json the covariance of every pose, the standard deviation of every point"
+    );
     println!("  metrics.json, history.csv, config.toml");
     println!("For COLMAP, TUM, GLB and NPZ: pba-infer export {}", out.display());
     Ok(())
@@ -104,6 +109,7 @@ pub fn reconstruct_and_score(
         device: backend,
         solver: config.solver,
         status: outcome.status,
+        hypotheses: outcome.hypotheses.clone(),
     };
     Ok(Reconstruction { outcome, history, report })
 }

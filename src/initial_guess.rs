@@ -4,7 +4,10 @@ use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    bundle_adjustment::unknowns::{Parameterisation, Unknowns},
+    bundle_adjustment::{
+        Hypothesis,
+        unknowns::{Parameterisation, Unknowns},
+    },
     checkpoint::Prior,
     data::{
         crop::CropCamera,
@@ -67,12 +70,17 @@ impl InitialGuess {
     }
 
     /// What bundle adjustment tries: Δp_l = 0, and each pose that is not too unlikely.
-    pub fn hypotheses(&self, n_frames: usize, parameterisation: Parameterisation) -> Vec<Unknowns> {
-        let unknowns = |(pose, _): &(Isometry3<f32>, f32)| {
-            Unknowns::new(*pose, n_frames, &self.style, parameterisation)
+    pub fn hypotheses(
+        &self,
+        n_frames: usize,
+        parameterisation: Parameterisation,
+    ) -> Vec<Hypothesis> {
+        let start = |&(pose, confidence): &(Isometry3<f32>, f32)| Hypothesis {
+            unknowns: Unknowns::new(pose, n_frames, &self.style, parameterisation),
+            confidence,
         };
         let least = LEAST_CONFIDENCE * self.poses[0].1;
-        self.poses.iter().filter(|(_, confidence)| *confidence >= least).map(unknowns).collect()
+        self.poses.iter().filter(|(_, confidence)| *confidence >= least).map(start).collect()
     }
 }
 

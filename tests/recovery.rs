@@ -79,7 +79,8 @@ fn remaining_error(seed: u64, n_points: usize, solver: Solver) -> f32 {
     let config = config(solver);
     let start = perturbed(&truth.camera_from_world, seed);
     let start = Unknowns::with_poses(&start, &[], config.objective.parameterisation);
-    let outcome = bundle_adjust(&sequence, &shape, &[start], &config, &device, &mut |_, _| ());
+    let outcome =
+        bundle_adjust(&sequence, &shape, &[start.into()], &config, &device, &mut |_, _| ());
     let found = outcome.unknowns.camera_from_world(&device);
     let errors = found.iter().zip(&truth.camera_from_world);
     let errors = errors.map(|(found, truth)| found.rotation.angle_to(&truth.rotation));

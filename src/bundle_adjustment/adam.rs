@@ -4,7 +4,11 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Progress, Status, objective::Objective, unknowns::Unknowns};
+use super::{
+    objective::Objective,
+    progress::{Ending, Progress, Status},
+    unknowns::Unknowns,
+};
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -57,17 +61,21 @@ impl Adam {
         [level, n_levels]: [usize; 2],
         config: &AdamConfig,
         progress: &mut Progress,
-    ) -> Status {
+    ) -> Ending {
         let mut best = (f64::INFINITY, unknowns.values.clone());
         for iteration in 0..config.iterations {
             let evaluation = objective.evaluate(unknowns, level);
             progress.report("joint", &evaluation, unknowns);
-            if !evaluation.objective.is_finite() {
-                unknowns.values = best.1;
-                return Status::NotFinite;
-            }
-            if evaluation.objective < best.0 {
-                best = (evaluation.objective, unknowns.values.clone());
+            match evaluation.fault() {
+                // The best so far is sound: back to it.
+                Some(status) if status == Status::NotFinite || best.0.is_finite() => {
+                    unknowns.values = best.1;
+                    return Ending { status, objective: best.0 };
+                }
+                None if evaluation.objective < best.0 => {
+                    best = (evaluation.objective, unknowns.values.clone());
+                }
+                _ => (),
             }
             let total = (n_levels * config.iterations) as f64;
             let done = (level * config.iterations + iteration) as f64 / total;
@@ -82,10 +90,16 @@ impl Adam {
         }
         let last = objective.evaluate(unknowns, level);
         progress.report("joint", &last, unknowns);
-        if last.objective > best.0 || !last.objective.is_finite() {
-            unknowns.values = best.1;
+        match last.fault() {
+            Some(status) if best.0.is_infinite() => Ending { status, objective: last.objective },
+            None if last.objective <= best.0 => {
+                Ending { status: Status::BudgetSpent, objective: last.objective }
+            }
+            _ => {
+                unknowns.values = best.1;
+                Ending { status: Status::BudgetSpent, objective: best.0 }
+            }
         }
-        Status::BudgetSpent
     }
 
     fn step(

@@ -6,9 +6,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Progress, Status,
+    evaluation::Evaluation,
     lbfgs::{LbfgsConfig, Sample, minimise},
-    objective::{Evaluation, Objective},
+    objective::Objective,
+    progress::{Ending, Progress, Status},
     shape_model::KnownPoints,
     unknowns::Unknowns,
 };
@@ -39,16 +40,17 @@ pub fn run(
     level: usize,
     config: &AlternatingConfig,
     progress: &mut Progress,
-) -> Status {
+) -> Ending {
     let mut previous = objective.evaluate(unknowns, level);
     progress.report("initial", &previous, unknowns);
     for round in 0..config.max_rounds {
         if !previous.objective.is_finite() {
-            return Status::NotFinite;
+            return ended(&previous, Status::NotFinite);
         }
         if previous.photometric <= config.loss_tolerance {
-            return Status::Converged;
+            return ended(&previous, Status::Converged);
         }
+        let start = unknowns.clone();
         update_relative_poses(objective, unknowns, level, &config.lbfgs);
         progress.report("relative poses", &objective.evaluate(unknowns, level), unknowns);
         update_block(objective, unknowns, Unknowns::REFERENCE, level, &config.lbfgs);
@@ -56,13 +58,22 @@ pub fn run(
         update_block(objective, unknowns, unknowns.style(), level, &config.lbfgs);
         let current = objective.evaluate(unknowns, level);
         progress.report("style", &current, unknowns);
-        progress.end_stage(&format!("round {}", round + 1), unknowns);
-        if previous.objective - current.objective <= 1e-4 * current.objective.abs() {
-            return Status::Converged;
+        if let Some(fault) = current.fault().filter(|_| previous.fault().is_none()) {
+            *unknowns = start;
+            return ended(&previous, fault);
         }
+        progress.end_stage(&format!("round {}", round + 1), unknowns);
+        let gain = previous.objective - current.objective;
         previous = current;
+        if gain <= 1e-4 * previous.objective.abs() {
+            return ended(&previous, Status::Converged);
+        }
     }
-    Status::BudgetSpent
+    ended(&previous, Status::BudgetSpent)
+}
+
+fn ended(last: &Evaluation, status: Status) -> Ending {
+    Ending { status: last.fault().unwrap_or(status), objective: last.objective }
 }
 
 /// Line 5 and 6: the frames do not meet while the shape and p_0 stand still.

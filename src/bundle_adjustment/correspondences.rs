@@ -24,6 +24,9 @@ pub struct Correspondences {
     pub points: Vec<[f32; 3]>,
     /// Where every point lands in each of them, in pixels.
     pub pixels: Vec<Vec<[f32; 2]>>,
+    /// How many of them land inside its picture, and how many lie behind its camera.
+    pub n_in_frame: Vec<usize>,
+    pub n_behind: Vec<usize>,
     /// The points that each of them sees.
     pub visible: Vec<Vec<u32>>,
     /// For each target, 1 where a point that the reference sees may be compared, else 0: `[t][m]`.
@@ -46,8 +49,13 @@ impl Correspondences {
         let cloud = points_in_world.clone();
         let visible = visible_points(cloud, poses, intrinsics, *size, &config.pseudo_render);
         let poses = poses.to_isometries();
-        let pixels: Vec<_> =
-            poses.par_iter().map(|pose| projected(&points, pose, intrinsics)).collect();
+        let (pixels, n_behind): (Vec<_>, Vec<_>) =
+            poses.par_iter().map(|pose| projected(&points, pose, intrinsics)).unzip();
+        let in_frame = |[u, v]: &&[f32; 2]| {
+            (0.0..size[0] as f32).contains(u) && (0.0..size[1] as f32).contains(v)
+        };
+        let n_in_frame = pixels.iter().map(|pixels| pixels.iter().filter(in_frame).count());
+        let n_in_frame = n_in_frame.collect();
         let comparable = (1..frames.len())
             .into_par_iter()
             .map(|t| {
@@ -55,7 +63,12 @@ impl Correspondences {
             })
             .collect();
         let pairs = pairs(observations, &frames, &pixels, &visible, config, level);
-        Self { frames, points, pixels, visible, comparable, pairs }
+        Self { frames, points, pixels, n_in_frame, n_behind, visible, comparable, pairs }
+    }
+
+    /// Whether every point lands somewhere.
+    pub fn are_finite(&self) -> bool {
+        self.pixels.iter().flatten().flatten().all(|x| x.is_finite())
     }
 
     /// How many colours are compared, all targets together; at least one.
@@ -64,21 +77,23 @@ impl Correspondences {
     }
 }
 
-/// Where every point lands in one view, as [`Intrinsics::project`] has it.
+/// Where every point lands in one view, as [`Intrinsics::project`] has it, and how many lie behind it.
 fn projected(
     points: &[[f32; 3]],
     camera_from_world: &Isometry3<f32>,
     intrinsics: &Intrinsics,
-) -> Vec<[f32; 2]> {
+) -> (Vec<[f32; 2]>, usize) {
     let rotation = camera_from_world.rotation.to_rotation_matrix().into_inner();
     let translation = camera_from_world.translation.vector;
     let [focal, center] = [intrinsics.focal, intrinsics.center].map(Vector2::from);
+    let mut n_behind = 0;
     let pixel = |&point: &[f32; 3]| {
         let in_camera = rotation * Vector3::from(point) + translation;
+        n_behind += usize::from(in_camera.z <= NEAR);
         let slopes = in_camera.xy() / in_camera.z.max(NEAR);
         (slopes.component_mul(&focal) + center).into()
     };
-    points.iter().map(pixel).collect()
+    (points.iter().map(pixel).collect(), n_behind)
 }
 
 /// Whether each point that the reference sees may be compared with one target.

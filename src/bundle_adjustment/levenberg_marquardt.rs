@@ -3,12 +3,16 @@
 //! The paper sets Gauss–Newton aside because ∂X/∂s hides in the network. A batch of decoded
 //! neighbours gives it by differences: one row of the batch for each direction.
 
-use nalgebra::{DVector, Isometry3};
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::{
-    Progress, Status, correspondences::Correspondences, linearisation::Linearisation,
-    normal_equations::NormalEquations, objective::Objective, shape_jacobian::ShapeJacobian,
+    correspondences::Correspondences,
+    linearisation::Linearisation,
+    normal_equations::NormalEquations,
+    objective::Objective,
+    progress::{Ending, Progress, Status},
+    shape_jacobian::ShapeJacobian,
     unknowns::Unknowns,
 };
 
@@ -47,21 +51,23 @@ const DAMPING_FACTORS: [f64; 2] = [6.0, 0.3];
 const MAX_TURN: f64 = 0.2;
 const MAX_STYLE_STEP: f64 = 0.7;
 
-/// Runs at one level of blur. A step that does not lower the objective is never taken.
+/// Runs at one level of blur. A step that does not lower the objective, or leads into a fault, is never
+/// taken.
 pub fn run(
     objective: &Objective,
     unknowns: &mut Unknowns,
     level: usize,
     config: &LevenbergMarquardtConfig,
     progress: &mut Progress,
-) -> Status {
+) -> Ending {
     let mut damping = DAMPING;
     let (mut current, mut matches) = objective.value(unknowns, level);
     let mut shape = ShapeJacobian::default();
+    let mut status = Status::BudgetSpent;
     for iteration in 0..config.iterations {
         progress.report("joint", &current, unknowns);
         if !current.objective.is_finite() {
-            return Status::NotFinite;
+            return Ending { status: Status::NotFinite, objective: current.objective };
         }
         let relative_only = level == 0 && iteration < config.relative_first;
         let n_directions = config.n_directions.min(unknowns.style().len());
@@ -71,25 +77,34 @@ pub fn run(
             true => model.relative_step(damping),
             false => model.step(damping),
         };
+        let mut refused = None;
         let better = |damping| {
             let step = limited(step(damping)?, n_directions);
             let next = unknowns.stepped(step.as_slice(), n_directions);
             let (value, matches) = objective.value(&next, level);
-            (value.objective < current.objective).then_some((next, value, matches))
+            if value.objective >= current.objective || value.objective.is_nan() {
+                return None;
+            }
+            refused = current.refuses(&value).or(refused);
+            current.refuses(&value).is_none().then_some((next, value, matches))
         };
-        let Some((next, value, next_matches)) = damped_step(better, &mut damping) else { break };
+        let Some((next, value, next_matches)) = damped_step(better, &mut damping) else {
+            status = refused.unwrap_or(Status::Converged);
+            break;
+        };
         let gain = current.objective - value.objective;
         (*unknowns, current, matches) = (next, value, next_matches);
         if !relative_only && gain <= config.relative_tolerance * current.objective {
+            status = Status::Converged;
             break;
         }
     }
     progress.report("joint", &current, unknowns);
-    Status::Converged
+    Ending { status: current.fault().unwrap_or(status), objective: current.objective }
 }
 
 /// Raises the damping until a step is `better`; `None` when none is.
-fn damped_step<T>(better: impl Fn(f64) -> Option<T>, damping: &mut f64) -> Option<T> {
+fn damped_step<T>(mut better: impl FnMut(f64) -> Option<T>, damping: &mut f64) -> Option<T> {
     while *damping <= DAMPING_LIMITS[1] {
         if let Some(found) = better(*damping) {
             *damping = (*damping * DAMPING_FACTORS[1]).max(DAMPING_LIMITS[0]);
@@ -117,7 +132,8 @@ fn limited(step: DVector<f64>, n_directions: usize) -> DVector<f64> {
     step / excess
 }
 
-fn normal_equations(
+/// The objective to second order around some unknowns, the style prior included.
+pub(super) fn normal_equations(
     objective: &Objective,
     unknowns: &Unknowns,
     level: usize,
@@ -125,24 +141,17 @@ fn normal_equations(
     matches: &Correspondences,
     config: &LevenbergMarquardtConfig,
 ) -> NormalEquations {
-    let poses: Vec<Isometry3<f64>> =
-        unknowns.camera_from_world(&objective.device).iter().map(|pose| pose.cast()).collect();
     let linearisation = Linearisation {
         observations: objective.observations,
         config: objective.config,
         level,
         matches,
-        poses: &poses,
+        poses: &unknowns.host_poses(&objective.device),
         shape,
         max_residuals: config.max_residuals,
     };
     let mut model = linearisation.normal_equations();
-    let style = &unknowns.values[unknowns.style()];
-    let weight = f64::from(objective.config.style_weight) / style.len().max(1) as f64;
-    for (i, &value) in style.iter().take(shape.n_directions()).enumerate() {
-        model.shared[(6 + i, 6 + i)] += weight;
-        model.shared_gradient[6 + i] += weight * value;
-    }
+    model.add_style_prior(objective.config.style_weight, &unknowns.values[unknowns.style()]);
     model
 }
 

@@ -4,30 +4,45 @@ pub mod adam;
 pub mod alternating;
 mod color_slope;
 pub mod correspondences;
+mod evaluation;
+mod hypotheses;
 pub mod lbfgs;
 pub mod levenberg_marquardt;
 mod linearisation;
 mod normal_equations;
 pub mod objective;
 pub mod observations;
+mod progress;
 mod rows;
 mod shape_jacobian;
 pub mod shape_model;
+#[cfg(test)]
+mod tests;
 pub mod unknowns;
 
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 
 use self::{
-    adam::{Adam, AdamConfig},
+    adam::AdamConfig,
     alternating::AlternatingConfig,
+    hypotheses::{Run, drop_those_behind},
     levenberg_marquardt::LevenbergMarquardtConfig,
-    objective::{Evaluation, Objective, ObjectiveConfig},
+    objective::{Objective, ObjectiveConfig},
     observations::Observations,
+    progress::Progress,
     shape_model::ShapeModel,
     unknowns::Unknowns,
 };
+pub use self::{
+    evaluation::Evaluation,
+    hypotheses::{Hypothesis, HypothesisReport},
+    progress::{Status, Step},
+};
 use crate::{data::sequence::Sequence, initial_guess::InitialStyle};
+
+/// Levels of blur after which hypotheses are not compared yet: coarsely, a car turned round fits as well.
+const COARSE_LEVELS: usize = 1;
 
 /// How the objective is minimised.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -48,9 +63,18 @@ pub struct BundleAdjustmentConfig {
     pub solver: Solver,
     /// Blur of the frames at each level, coarse to fine: a Gaussian's standard deviation in pixels.
     pub blurs: Vec<f32>,
-    /// Initial poses that are tried; the one that ends with the least objective is kept. Front and back
-    /// look alike until the frames are sharp.
+    /// Initial poses that are tried. Front and back look alike until the frames are sharp.
     pub n_hypotheses: usize,
+    /// n, the independent observations that an objective L is worth: −log likelihood is ½ n log L. The
+    /// hypothesis is kept for which that, less the log of the regressor's confidence, is least.
+    ///
+    /// Points, pixels and frames are many more. But what L ends with is what the shape cannot explain: the
+    /// same in frames 2° apart, and alike over a whole bumper. A view shows some 0.2 squared diagonals of a
+    /// car, and a patch that errs together is about a tenth of a diagonal wide: 20.
+    pub independent_observations: f64,
+    /// How far a hypothesis may be behind the best one after the coarse levels, in nats of the same
+    /// measure; it is dropped beyond.
+    pub drop_margin: f64,
     pub initial_style: InitialStyle,
     pub objective: ObjectiveConfig,
     pub adam: AdamConfig,
@@ -64,6 +88,8 @@ impl Default for BundleAdjustmentConfig {
             solver: Solver::Lm,
             blurs: vec![3.0, 1.5, 0.7, 0.0],
             n_hypotheses: 2,
+            independent_observations: 20.0,
+            drop_margin: 5.0,
             initial_style: InitialStyle::default(),
             objective: ObjectiveConfig::default(),
             adam: AdamConfig::default(),
@@ -104,62 +130,6 @@ impl BundleAdjustmentConfig {
     }
 }
 
-/// Why a solver stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Status {
-    /// The loss is small enough, or no longer falls.
-    Converged,
-    /// All iterations are used.
-    BudgetSpent,
-    /// The objective ceased to be finite; the last good unknowns are returned.
-    NotFinite,
-}
-
-/// One line of the history: the solver's own terms, on blurred images where it blurs them.
-#[derive(Clone, Debug, Serialize)]
-pub struct Step {
-    pub iteration: usize,
-    pub hypothesis: usize,
-    /// Blur of the frames in pixels.
-    pub blur: f32,
-    pub block: String,
-    pub objective: f64,
-    pub photometric: f64,
-    pub silhouette: f64,
-    pub n_visible: usize,
-}
-
-/// Collects what a solver reports, and passes it on.
-pub struct Progress<'a> {
-    observe: &'a mut dyn FnMut(&Step, &Unknowns),
-    stages: Vec<(String, Unknowns)>,
-    iteration: usize,
-    hypothesis: usize,
-    blur: f32,
-}
-
-impl Progress<'_> {
-    fn report(&mut self, block: &str, evaluation: &Evaluation, unknowns: &Unknowns) {
-        let step = Step {
-            iteration: self.iteration,
-            hypothesis: self.hypothesis,
-            blur: self.blur,
-            block: block.into(),
-            objective: evaluation.objective,
-            photometric: evaluation.photometric,
-            silhouette: evaluation.silhouette,
-            n_visible: evaluation.n_visible,
-        };
-        self.iteration += 1;
-        (self.observe)(&step, unknowns);
-    }
-
-    fn end_stage(&mut self, name: &str, unknowns: &Unknowns) {
-        self.stages.push((name.into(), unknowns.clone()));
-    }
-}
-
 /// What bundle adjustment found.
 pub struct Outcome {
     pub unknowns: Unknowns,
@@ -168,6 +138,8 @@ pub struct Outcome {
     pub stages: Vec<(String, Unknowns)>,
     /// Evaluations that were reported, over all hypotheses.
     pub iterations: usize,
+    /// What became of each initial guess that was tried, in their order.
+    pub hypotheses: Vec<HypothesisReport>,
 }
 
 /// Adjusts poses and shape to a sequence, from one or several initial guesses, likeliest first.
@@ -176,7 +148,7 @@ pub struct Outcome {
 pub fn bundle_adjust(
     sequence: &Sequence,
     shape: &dyn ShapeModel,
-    hypotheses: &[Unknowns],
+    hypotheses: &[Hypothesis],
     config: &BundleAdjustmentConfig,
     device: &Device,
     observe: &mut dyn FnMut(&Step, &Unknowns),
@@ -191,71 +163,32 @@ pub fn bundle_adjust(
     let mut progress =
         Progress { observe, stages: Vec::new(), iteration: 0, hypothesis: 0, blur: 0.0 };
     let hypotheses = &hypotheses[..hypotheses.len().min(config.n_hypotheses.max(1))];
-    let finished = hypotheses.iter().enumerate().map(|(idx, hypothesis)| {
-        progress.hypothesis = idx;
-        progress.end_stage("initial", &hypotheses[0]);
-        let run = Run::new(hypothesis).through_all_levels(&objective, config, &mut progress);
-        let cost = objective.value(&run.unknowns, config.blurs.len() - 1).0.objective;
-        (cost, run, std::mem::take(&mut progress.stages))
-    });
-    // NaN is the greatest.
-    let best = finished.min_by(|a, b| a.0.total_cmp(&b.0));
-    let (_, run, stages) = best.expect("there is a hypothesis");
-    Outcome { unknowns: run.unknowns, status: run.status, iterations: progress.iteration, stages }
-}
-
-/// One hypothesis on its way.
-struct Run {
-    unknowns: Unknowns,
-    adam: Adam,
-    status: Status,
-}
-
-impl Run {
-    fn new(initial: &Unknowns) -> Self {
-        let (unknowns, adam) = (initial.clone(), Adam::new(initial));
-        Self { unknowns, adam, status: Status::BudgetSpent }
-    }
-
-    fn through_all_levels(
-        mut self,
-        objective: &Objective,
-        config: &BundleAdjustmentConfig,
-        progress: &mut Progress,
-    ) -> Self {
-        for level in 0..config.blurs.len() {
-            self.advance(objective, level, config, progress);
-            if self.status == Status::NotFinite {
-                break;
-            }
+    let initial = &hypotheses[0].unknowns;
+    let mut runs: Vec<Run> = hypotheses.iter().map(|start| Run::new(start, initial)).collect();
+    let last_level = config.blurs.len() - 1;
+    for level in 0..=last_level {
+        for (idx, run) in runs.iter_mut().enumerate().filter(|(_, run)| run.goes_on()) {
+            progress.hypothesis = idx;
+            run.advance(&objective, level, config, &mut progress);
         }
-        self
-    }
-
-    fn advance(
-        &mut self,
-        objective: &Objective,
-        level: usize,
-        config: &BundleAdjustmentConfig,
-        progress: &mut Progress,
-    ) {
-        progress.blur = config.blurs[level];
-        let levels = [level, config.blurs.len()];
-        self.status = match config.solver {
-            Solver::Adam => {
-                self.adam.run(objective, &mut self.unknowns, levels, &config.adam, progress)
-            }
-            Solver::Lm => {
-                let config = &config.lm;
-                levenberg_marquardt::run(objective, &mut self.unknowns, level, config, progress)
-            }
-            Solver::AlternatingLbfgs => {
-                let config = &config.alternating;
-                alternating::run(objective, &mut self.unknowns, level, config, progress)
-            }
-        };
-        if config.solver != Solver::AlternatingLbfgs {
-            progress.end_stage(&format!("blur {}", progress.blur), &self.unknowns);
+        if COARSE_LEVELS <= level && level < last_level {
+            drop_those_behind(&mut runs, config.drop_margin);
         }
+    }
+    let reports = runs.iter().map(|run| run.report.clone()).collect();
+    // A run that was dropped has seen coarser frames only: what it ended with does not compare.
+    let best =
+        runs.into_iter().filter(|run| run.report.status != Status::Dropped).min_by(|a, b| {
+            let ([a_faulty, b_faulty], [a, b]) =
+                ([a.rank().0, b.rank().0], [a.rank().1, b.rank().1]);
+            a_faulty.cmp(&b_faulty).then(a.total_cmp(&b))
+        });
+    let Run { unknowns, stages, report, .. } = best.expect("the best is never dropped");
+    Outcome {
+        unknowns,
+        status: report.status,
+        iterations: progress.iteration,
+        stages,
+        hypotheses: reports,
     }
 }

@@ -46,6 +46,15 @@ impl NormalEquations {
         equations
     }
 
+    /// Adds a weighted mean of squares over a style, of which the leading directions are solved for.
+    pub fn add_style_prior(&mut self, weight: f32, style: &[f64]) {
+        let weight = f64::from(weight) / style.len().max(1) as f64;
+        for (i, value) in (6..self.shared.nrows()).zip(style) {
+            self.shared[(i, i)] += weight;
+            self.shared_gradient[i] += weight * value;
+        }
+    }
+
     /// The step [p_0 | s | Δp_1 | …] of the damped equations: the Schur complement on the Δp_l leaves
     /// those of [p_0 | s], and time grows with the number of frames. `None` where they are singular or
     /// not finite.
@@ -85,10 +94,14 @@ impl NormalEquations {
         step.iter().all(|x| x.is_finite()).then(|| DVector::from_vec(step))
     }
 
+    /// Numbers in a step.
+    pub fn size(&self) -> usize {
+        self.shared.nrows() + 6 * self.frames.len()
+    }
+
     /// H as one matrix.
     pub fn hessian(&self) -> DMatrix<f64> {
-        let n_shared = self.shared.nrows();
-        let size = n_shared + 6 * self.frames.len();
+        let (n_shared, size) = (self.shared.nrows(), self.size());
         let mut hessian = DMatrix::zeros(size, size);
         hessian.view_mut((0, 0), (n_shared, n_shared)).copy_from(&self.shared);
         for (start, frame) in (n_shared..).step_by(6).zip(&self.frames) {
@@ -100,6 +113,7 @@ impl NormalEquations {
     }
 
     /// g as one vector.
+    #[cfg(test)]
     pub fn gradient(&self) -> DVector<f64> {
         let of_frames = self.frames.iter().flat_map(|frame| frame.gradient.as_slice());
         let gradient: Vec<f64> = self.shared_gradient.iter().chain(of_frames).copied().collect();

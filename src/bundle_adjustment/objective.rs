@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     correspondences::Correspondences,
+    evaluation::Evaluation,
     observations::Observations,
     shape_model::ShapeModel,
     unknowns::{Leaves, Parameterisation, Unknowns, flatten},
@@ -128,17 +129,6 @@ struct Terms {
     matches: Correspondences,
 }
 
-/// The objective and its gradient at some unknowns, on the host.
-#[derive(Clone, Debug)]
-pub struct Evaluation {
-    pub objective: f64,
-    pub photometric: f64,
-    pub silhouette: f64,
-    pub n_visible: usize,
-    /// In the order of [`Unknowns::values`]; empty where nothing depends on them.
-    pub gradient: Vec<f64>,
-}
-
 impl Objective<'_> {
     /// The objective over the reference frame and all targets, on images of one blur level.
     pub fn evaluate(&self, unknowns: &Unknowns, level: usize) -> Evaluation {
@@ -179,16 +169,12 @@ impl Objective<'_> {
             let deviation = leaves.style.clone().square().mean();
             objective = objective + deviation * self.config.style_weight;
         }
-        let evaluation = Evaluation {
-            objective: scalar(&objective),
-            photometric,
-            silhouette,
-            n_visible: terms.matches.visible[0].len(),
-            gradient: match objective.is_tracked() {
-                true => flatten(&leaves, &objective.backward()),
-                false => Vec::new(),
-            },
+        let values = [scalar(&objective), photometric, silhouette];
+        let gradient = match objective.is_tracked() {
+            true => flatten(&leaves, &objective.backward()),
+            false => Vec::new(),
         };
+        let evaluation = Evaluation::new(values, &terms.matches, gradient);
         (evaluation, terms.matches)
     }
 

@@ -156,6 +156,11 @@ impl Unknowns {
         reference.and(targets)
     }
 
+    /// The same in double precision, to differentiate by.
+    pub(super) fn host_poses(&self, device: &Device) -> Vec<Isometry3<f64>> {
+        self.camera_from_world(device).iter().map(|pose| pose.cast()).collect()
+    }
+
     /// The pose of every frame on the host.
     pub fn camera_from_world(&self, device: &Device) -> Vec<Isometry3<f32>> {
         self.poses(&self.leaves(&device.clone().inner())).to_isometries()

@@ -5,7 +5,8 @@ use image::{Luma, Rgb};
 use nalgebra::{Isometry3, Vector3};
 use object_pba::{
     bundle_adjustment::{
-        objective::{Evaluation, Objective, ObjectiveConfig},
+        Evaluation,
+        objective::{Objective, ObjectiveConfig},
         observations::Observations,
         shape_model::{FreePoints, KnownPoints, ShapeModel},
         unknowns::Unknowns,
