@@ -8,6 +8,7 @@ use std::{
 use anyhow::{Context, Result, bail};
 use indicatif::{ParallelProgressIterator, ProgressStyle};
 use object_pba::{
+    bundle_adjustment::WithinTwoSigma,
     config::write_config,
     data::formats::{Layout, SequenceHints, read_sequence},
     reconstruction::Scores,
@@ -108,6 +109,22 @@ fn table(entries: &[Entry]) -> String {
     }
     let seconds: Vec<f64> = reports.iter().map(|report| report.seconds).collect();
     text += &format!("| seconds | | | {} | {} |\n", cell(mean(&seconds)), cell(median(&seconds)));
+
+    let within: Vec<_> = reports
+        .iter()
+        .filter_map(|report| report.uncertainty.as_ref()?.within_two_sigma.as_ref())
+        .collect();
+    type Share = fn(&WithinTwoSigma) -> f64;
+    let shares: [(&str, Share); 3] = [
+        ("rotation", |within| within.rotation),
+        ("translation", |within| within.translation),
+        ("relative rotation", |within| within.relative_rotation),
+    ];
+    for (name, share) in shares {
+        let values: Vec<f64> = within.iter().map(|&within| share(within)).collect();
+        let cells = [mean(&values), median(&values)].map(cell).join(" | ");
+        text += &format!("| {name} errors within 2σ (share of components) | | | {cells} |\n");
+    }
 
     let mut models: Vec<&str> = done.iter().map(|(model, _)| *model).collect();
     models.dedup();

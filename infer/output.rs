@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use anyhow::{Context, Result};
 use nalgebra::Point3;
 use object_pba::{
-    bundle_adjustment::{BundleAdjustmentConfig, Step},
+    bundle_adjustment::{BundleAdjustmentConfig, Step, Uncertainty},
     checkpoint::Prior,
     config::write_config,
     data::{
@@ -74,9 +74,20 @@ pub fn write(
     let metrics = serde_json::to_string_pretty(&reconstruction.report)?;
     let path = out.join("metrics.json");
     fs::write(&path, metrics).with_context(|| format!("cannot write {}", path.display()))?;
+    if let Some(uncertainty) = &reconstruction.outcome.uncertainty {
+        write_uncertainty(&out.join("uncertainty.json"), uncertainty)?;
+    }
     figures::write_stages(out, prior, sequence, config, &device, &reconstruction.outcome)?;
     let seen: Vec<[u8; 3]> = colors.iter().map(|color| color.unwrap_or(figures::UNSEEN)).collect();
     figures::write_cloud(&out.join("cloud.png"), &poses[0], &cloud, &seen)
+}
+
+/// Covariances row by row, of [φ, ρ]: the true pose is (exp(φ) R, t + ρ), in radians and world units along
+/// the camera's axes. Standard deviations of points are in world units, in the order of `points.ply`.
+fn write_uncertainty(path: &Path, uncertainty: &Uncertainty) -> Result<()> {
+    let poses: Vec<&[f64]> = uncertainty.poses.iter().map(|pose| pose.as_slice()).collect();
+    let text = serde_json::json!({ "pose_covariances": poses, "point_sigmas": uncertainty.points });
+    fs::write(path, text.to_string()).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn write_history(path: &Path, history: &[Step]) -> Result<()> {

@@ -3,10 +3,12 @@
 use std::{fs, path::Path, time::Instant};
 
 use anyhow::{Context, Result};
+use burn::tensor::Device;
 use indicatif::{ProgressBar, ProgressStyle};
 use object_pba::{
     bundle_adjustment::{
-        BundleAdjustmentConfig, HypothesisReport, Outcome, Solver, Status, Step, unknowns::Unknowns,
+        BundleAdjustmentConfig, HypothesisReport, Outcome, Solver, Status, Step, Uncertainty,
+        WithinTwoSigma, unknowns::Unknowns,
     },
     checkpoint::Prior,
     data::sequence::Sequence,
@@ -32,6 +34,38 @@ pub struct Report {
     /// Why the solver stopped on what it found, and on each hypothesis.
     pub status: Status,
     pub hypotheses: Vec<HypothesisReport>,
+    pub uncertainty: Option<UncertaintyReport>,
+}
+
+/// Standard deviations: roots of expected squared errors. `null` where the solver knows none.
+#[derive(Clone, Debug, Serialize)]
+pub struct UncertaintyReport {
+    /// Of each frame's orientation, and of each target's relative to the reference frame.
+    pub rotation_sigma_deg: Vec<f64>,
+    pub relative_rotation_sigma_deg: Vec<f64>,
+    /// Of each frame's t, in world units.
+    pub translation_sigma: Vec<f64>,
+    /// Mean over the points, in world units; `uncertainty.json` has each.
+    pub point_sigma_mean: f64,
+    /// Where the truth is known in the same world.
+    pub within_two_sigma: Option<WithinTwoSigma>,
+}
+
+impl UncertaintyReport {
+    fn new(found: &Uncertainty, sequence: &Sequence, unknowns: &Unknowns, device: &Device) -> Self {
+        let degrees = |radians: Vec<f64>| radians.into_iter().map(f64::to_degrees).collect();
+        let truth = sequence.truth.as_ref().filter(|truth| truth.canonical);
+        Self {
+            rotation_sigma_deg: degrees(found.rotation_deviations()),
+            relative_rotation_sigma_deg: degrees(found.relative_rotation_deviations()),
+            translation_sigma: found.translation_deviations(),
+            point_sigma_mean: found.points.iter().sum::<f64>() / found.points.len().max(1) as f64,
+            within_two_sigma: truth.map(|truth| {
+                let estimate = unknowns.camera_from_world(device);
+                found.within_two_sigma(&estimate, &truth.camera_from_world)
+            }),
+        }
+    }
 }
 
 /// A finished reconstruction, with all that figures are made from.
@@ -110,6 +144,10 @@ pub fn reconstruct_and_score(
         solver: config.solver,
         status: outcome.status,
         hypotheses: outcome.hypotheses.clone(),
+        uncertainty: outcome
+            .uncertainty
+            .as_ref()
+            .map(|found| UncertaintyReport::new(found, sequence, &outcome.unknowns, &device)),
     };
     Ok(Reconstruction { outcome, history, report })
 }

@@ -18,6 +18,7 @@ mod shape_jacobian;
 pub mod shape_model;
 #[cfg(test)]
 mod tests;
+mod uncertainty;
 pub mod unknowns;
 
 use burn::tensor::Device;
@@ -32,12 +33,14 @@ use self::{
     observations::Observations,
     progress::Progress,
     shape_model::ShapeModel,
+    uncertainty::uncertainty,
     unknowns::Unknowns,
 };
 pub use self::{
     evaluation::Evaluation,
     hypotheses::{Hypothesis, HypothesisReport},
     progress::{Status, Step},
+    uncertainty::{Uncertainty, WithinTwoSigma},
 };
 use crate::{data::sequence::Sequence, initial_guess::InitialStyle};
 
@@ -66,7 +69,8 @@ pub struct BundleAdjustmentConfig {
     /// Initial poses that are tried. Front and back look alike until the frames are sharp.
     pub n_hypotheses: usize,
     /// n, the independent observations that an objective L is worth: −log likelihood is ½ n log L. The
-    /// hypothesis is kept for which that, less the log of the regressor's confidence, is least.
+    /// hypothesis is kept for which that, less the log of the regressor's confidence, is least; and the
+    /// covariance of what it found is L / n H⁻¹.
     ///
     /// Points, pixels and frames are many more. But what L ends with is what the shape cannot explain: the
     /// same in frames 2° apart, and alike over a whole bumper. A view shows some 0.2 squared diagonals of a
@@ -140,6 +144,8 @@ pub struct Outcome {
     pub iterations: usize,
     /// What became of each initial guess that was tried, in their order.
     pub hypotheses: Vec<HypothesisReport>,
+    /// Of what was found; Levenberg–Marquardt alone knows it.
+    pub uncertainty: Option<Uncertainty>,
 }
 
 /// Adjusts poses and shape to a sequence, from one or several initial guesses, likeliest first.
@@ -184,7 +190,13 @@ pub fn bundle_adjust(
             a_faulty.cmp(&b_faulty).then(a.total_cmp(&b))
         });
     let Run { unknowns, stages, report, .. } = best.expect("the best is never dropped");
+    let certain = || {
+        let n_observations = config.independent_observations;
+        uncertainty(&objective, &unknowns, last_level, &config.lm, n_observations)
+    };
+    let known = config.solver == Solver::Lm && !report.status.is_fault();
     Outcome {
+        uncertainty: known.then(certain).flatten(),
         unknowns,
         status: report.status,
         iterations: progress.iteration,

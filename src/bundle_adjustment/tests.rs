@@ -52,6 +52,7 @@ fn check_status(outcomes: &[Outcome], expected: Status) {
     for (outcome, solver) in outcomes.iter().zip(SOLVERS) {
         assert_eq!(outcome.status, expected, "{solver:?}");
         assert_eq!(outcome.hypotheses[0].status, expected, "{solver:?}");
+        assert!(outcome.uncertainty.is_none(), "{solver:?}");
     }
 }
 
