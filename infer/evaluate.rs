@@ -3,17 +3,19 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    sync::atomic::{AtomicUsize, Ordering},
+    thread,
 };
 
 use anyhow::{Context, Result, bail};
-use indicatif::{ParallelProgressIterator, ProgressStyle};
+use indicatif::{ProgressBar, ProgressStyle};
 use object_pba::{
     bundle_adjustment::WithinTwoSigma,
     config::write_config,
     data::formats::{Layout, SequenceHints, read_sequence},
     reconstruction::Scores,
 };
-use rayon::prelude::*;
+use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 
 use crate::{
@@ -37,25 +39,19 @@ pub fn evaluate(dataset: &Path, out: &Path, options: &Options) -> Result<()> {
     fs::create_dir_all(out).with_context(|| format!("cannot create {}", out.display()))?;
     write_config(&out.join("config.toml"), &config)?;
 
-    let style = "{bar:30} {pos}/{len} {elapsed_precise} (ETA {eta})";
-    let style = ProgressStyle::with_template(style).expect("a valid template");
     let reconstruct = |path: &PathBuf| -> Result<Report> {
         let sequence = read_sequence(path, &SequenceHints::default())?.sequence;
         Ok(reconstruct_and_score(&prior, &sequence, &config, options.device, &mut |_, _| {})?
             .report)
     };
-    let entries: Vec<Entry> = sequences
-        .par_iter()
-        .progress_with_style(style)
-        .map(|path| {
-            let result = reconstruct(path);
-            Entry {
-                sequence: path.file_name().unwrap_or_default().to_string_lossy().into(),
-                failure: result.as_ref().err().map(|error| format!("{error:#}")),
-                report: result.ok(),
-            }
-        })
-        .collect();
+    let entries = side_by_side(&sequences, |path| {
+        let result = reconstruct(path);
+        Entry {
+            sequence: path.file_name().unwrap_or_default().to_string_lossy().into(),
+            failure: result.as_ref().err().map(|error| format!("{error:#}")),
+            report: result.ok(),
+        }
+    });
 
     let lines: Vec<String> = entries.iter().map(serde_json::to_string).collect::<Result<_, _>>()?;
     write(&out.join("per_sequence.jsonl"), &(lines.join("\n") + "\n"))?;
@@ -68,6 +64,35 @@ pub fn evaluate(dataset: &Path, out: &Path, options: &Options) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Works on as many items as there are cores, each on one of them, and keeps their order.
+///
+/// In one pool, a core that waits for its share of an item would take up another one meanwhile: more
+/// and more would be under way, each with its memory, and none would be timed right.
+fn side_by_side<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let style = "{bar:30} {pos}/{len} {elapsed_precise} (ETA {eta})";
+    let style = ProgressStyle::with_template(style).expect("a valid template");
+    let bar = ProgressBar::new(items.len() as u64).with_style(style);
+    let n_workers = rayon::current_num_threads().min(items.len());
+    let next = AtomicUsize::new(0);
+    let work_alone = || {
+        let pool = ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can start");
+        let mut done = Vec::new();
+        loop {
+            let idx = next.fetch_add(1, Ordering::Relaxed);
+            let Some(item) = items.get(idx) else { break done };
+            done.push((idx, pool.install(|| work(item))));
+            bar.inc(1);
+        }
+    };
+    let mut done: Vec<(usize, R)> = thread::scope(|scope| {
+        let workers: Vec<_> = (0..n_workers).map(|_| scope.spawn(work_alone)).collect();
+        workers.into_iter().flat_map(|worker| worker.join().expect("no work panics")).collect()
+    });
+    bar.finish_and_clear();
+    done.sort_by_key(|(idx, _)| *idx);
+    done.into_iter().map(|(_, result)| result).collect()
 }
 
 /// The folders below `dataset` that hold a sequence with its camera, in order of their names.

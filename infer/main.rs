@@ -19,6 +19,7 @@ use object_pba::{
     checkpoint::Prior,
     config::read_config,
     device::Backend,
+    initial_guess::Start,
 };
 
 use export::Format;
@@ -103,6 +104,9 @@ struct Options {
     /// Preset of this solver; overrides the config's when both are given.
     #[arg(long, value_enum)]
     solver: Option<Solver>,
+    /// Where to start; the truth, where it is known, shows what the prior and the objective cost.
+    #[arg(long, value_enum)]
+    start: Option<Start>,
     /// TOML file with what differs from the defaults, such as configs/infer-joint.toml.
     #[arg(long)]
     config: Option<PathBuf>,
@@ -123,6 +127,7 @@ impl Options {
             None => BundleAdjustmentConfig::preset(self.solver.unwrap_or_default()),
         };
         config.solver = self.solver.unwrap_or(config.solver);
+        config.start = self.start.unwrap_or(config.start);
         Ok(config)
     }
 }

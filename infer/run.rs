@@ -13,6 +13,7 @@ use object_pba::{
     checkpoint::Prior,
     data::sequence::Sequence,
     device::Backend,
+    initial_guess::Start,
     reconstruction::{Scores, reconstruct, score},
 };
 use serde::Serialize;
@@ -127,8 +128,11 @@ pub fn reconstruct_and_score(
         history.push(step.clone());
         observe(step, unknowns);
     });
-    let outcome = outcome
-        .with_context(|| format!("{}: the reference frame's mask is empty", sequence.name))?;
+    let missing = match config.start {
+        Start::Regressors => "the reference frame's mask is empty",
+        Start::Truth => "its true poses and points, to start from, are not known",
+    };
+    let outcome = outcome.with_context(|| format!("{}: {missing}", sequence.name))?;
     let seconds = start.elapsed().as_secs_f64();
 
     let generator = &prior.shape.generator;

@@ -1,5 +1,6 @@
 //! Where bundle adjustment starts: what the regressors make of the frames (Sec. 3.2).
 
+use burn::tensor::{Tensor, TensorData};
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +14,7 @@ use crate::{
         crop::CropCamera,
         sequence::{Frame, Sequence},
     },
+    host::host_values,
     silhouette::MASK_THRESHOLD,
 };
 
@@ -30,6 +32,18 @@ pub enum InitialStyle {
     /// All frames whose masks are not empty (the paper's footnote 2), direction by direction.
     Mean,
     Median,
+}
+
+/// Where bundle adjustment starts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Start {
+    /// At what the regressors make of the frames.
+    #[default]
+    Regressors,
+    /// At the true poses and the encoded true shape: what is then still wrong in the end is neither the
+    /// initialisation's fault nor that of a solver which does not find its way.
+    Truth,
 }
 
 /// R_s(I) and R_p(I_0): a style, and poses of the reference frame.
@@ -82,6 +96,21 @@ impl InitialGuess {
         let least = LEAST_CONFIDENCE * self.poses[0].1;
         self.poses.iter().filter(|(_, confidence)| *confidence >= least).map(start).collect()
     }
+}
+
+/// The true poses, and the style of the true shape; `None` where either is unknown.
+pub fn true_unknowns(
+    prior: &Prior,
+    sequence: &Sequence,
+    parameterisation: Parameterisation,
+) -> Option<Unknowns> {
+    let truth = sequence.truth.as_ref().filter(|truth| truth.canonical)?;
+    let points = truth.points.as_ref()?.iter().map(|point| point.coords.into());
+    let seen: Vec<[f32; 3]> = points.take(prior.config.prior.network.n_encoder_points).collect();
+    let data = TensorData::new(seen.concat(), [1, seen.len(), 3]);
+    let style =
+        prior.shape.encode(Tensor::from_data(data, &prior.shape.generator.deviations().device()));
+    Some(Unknowns::with_poses(&truth.camera_from_world, &host_values(&style), parameterisation))
 }
 
 fn mean(values: Vec<f32>) -> f32 {

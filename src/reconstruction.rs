@@ -14,12 +14,13 @@ use crate::{
     checkpoint::Prior,
     data::sequence::Sequence,
     host::{host_pixels, host_points},
-    initial_guess::InitialGuess,
+    initial_guess::{InitialGuess, Start, true_unknowns},
     metrics::{PoseErrors, style_error},
     pseudo_render::{PseudoRenderConfig, visible_points},
 };
 
-/// Initialises and adjusts. `None` when the reference frame's mask is empty.
+/// Initialises and adjusts. `None` when there is nothing to start from: the reference frame's mask is
+/// empty, or the truth is asked for and not known.
 pub fn reconstruct(
     prior: &Prior,
     sequence: &Sequence,
@@ -27,9 +28,14 @@ pub fn reconstruct(
     device: &Device,
     observe: &mut dyn FnMut(&Step, &Unknowns),
 ) -> Option<Outcome> {
-    let guess = InitialGuess::of_sequence(prior, sequence, config.initial_style)?;
     let parameterisation = config.objective.parameterisation;
-    let hypotheses = guess.hypotheses(sequence.frames.len(), parameterisation);
+    let hypotheses = match config.start {
+        Start::Regressors => {
+            let guess = InitialGuess::of_sequence(prior, sequence, config.initial_style)?;
+            guess.hypotheses(sequence.frames.len(), parameterisation)
+        }
+        Start::Truth => vec![true_unknowns(prior, sequence, parameterisation)?.into()],
+    };
     let generator = &prior.shape.generator;
     Some(bundle_adjust(sequence, generator, &hypotheses, config, device, observe))
 }

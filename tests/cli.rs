@@ -97,6 +97,28 @@ fn the_demo_writes_all_it_names() {
 }
 
 #[test]
+fn a_run_that_starts_at_the_truth_starts_without_an_error_and_needs_one() {
+    let folder = TempDir::new().unwrap();
+    let quick = folder.path().join("quick.toml");
+    fs::write(&quick, "blurs = [0.0]\n[lm]\niterations = 1\n").unwrap();
+    let [quick, out] = [&quick, folder.path()].map(|path| path.to_str().unwrap());
+    let sequence = sample();
+    let arguments = ["--config", quick, "--start", "truth"];
+    let path = sequence.path().to_str().unwrap();
+    let output = pba_infer(&[&["run", path, "--out", out], &arguments[..]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let metrics = fs::read_to_string(folder.path().join("metrics.json")).unwrap();
+    let metrics: Value = serde_json::from_str(&metrics).unwrap();
+    let error = |name: &str| metrics["initial"][name].as_f64().unwrap();
+    assert!(error("rotation_error_deg_mean") < 0.01 && error("translation_error_mean") < 1e-4);
+    // What the encoder makes of the true shape: twice the noise of sampling it, not more.
+    assert!(error("style_error") < 1.5e-4);
+
+    fs::remove_file(sequence.path().join("points.ply")).unwrap();
+    check_refused(&run(sequence.path(), &arguments), &["true poses and points", "not known"]);
+}
+
+#[test]
 fn estimated_cameras_are_a_sequence_of_the_same_convention() {
     let folder = TempDir::new().unwrap();
     let still = folder.path().join("still.toml");

@@ -42,7 +42,10 @@ pub use self::{
     progress::{Status, Step},
     uncertainty::{Uncertainty, WithinTwoSigma},
 };
-use crate::{data::sequence::Sequence, initial_guess::InitialStyle};
+use crate::{
+    data::sequence::Sequence,
+    initial_guess::{InitialStyle, Start},
+};
 
 /// Levels of blur after which hypotheses are not compared yet: coarsely, a car turned round fits as well.
 const COARSE_LEVELS: usize = 1;
@@ -79,6 +82,7 @@ pub struct BundleAdjustmentConfig {
     /// How far a hypothesis may be behind the best one after the coarse levels, in nats of the same
     /// measure; it is dropped beyond.
     pub drop_margin: f64,
+    pub start: Start,
     pub initial_style: InitialStyle,
     pub objective: ObjectiveConfig,
     pub adam: AdamConfig,
@@ -94,6 +98,7 @@ impl Default for BundleAdjustmentConfig {
             n_hypotheses: 2,
             independent_observations: 20.0,
             drop_margin: 5.0,
+            start: Start::default(),
             initial_style: InitialStyle::default(),
             objective: ObjectiveConfig::default(),
             adam: AdamConfig::default(),
