@@ -30,7 +30,12 @@ pub struct Prior {
 
 impl Prior {
     /// Reads the folder that a training run has written.
+    ///
+    /// Weights are kept off the graph, whatever `device` does: styles and poses bring it along where
+    /// they need it, and on it even what nobody differentiates stays in memory until the next backward
+    /// pass, which Levenberg–Marquardt never makes.
     pub fn load(folder: &Path, device: &Device) -> Result<Self> {
+        let device = &device.clone().inner();
         let config = TrainingConfig::read(&folder.join(CONFIG_FILE))?;
         let shape = load_shape(&config, &folder.join(SHAPE_FILE), device)?;
         let regressors =
@@ -38,13 +43,15 @@ impl Prior {
         Ok(Self { shape, regressors, config })
     }
 
-    /// Reads the contents of these files from memory; errors name the files they would be.
+    /// Reads the contents of these files from memory, [as from a folder](Self::load); errors name the files
+    /// they would be.
     pub fn load_bytes(
         config: &str,
         shape: &[u8],
         regressors: &[u8],
         device: &Device,
     ) -> Result<Self> {
+        let device = &device.clone().inner();
         let config = TrainingConfig::parse(config, Path::new(CONFIG_FILE))?;
         let shape = shape_from_bytes(&config, shape, Path::new(SHAPE_FILE), device)?;
         let module = config.regressors.network.init(shape.n_style(), device);
@@ -151,6 +158,21 @@ mod tests {
         let [before, after] = [&shape, &prior.shape]
             .map(|shape| host_values(&shape.generator.forward(style.clone())));
         assert!(before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 1e-3));
+    }
+
+    #[test]
+    fn weights_stay_off_the_graph_and_styles_bring_it_along() {
+        let folder = tempfile::tempdir().unwrap();
+        write_prior(folder.path());
+        let device = Device::flex().autodiff();
+        let prior = Prior::load(folder.path(), &device).unwrap();
+        let decode = |style: Tensor<2>| prior.shape.generator.forward(style);
+        assert!(!decode(Tensor::ones([1, 6], &device.clone().inner())).device().is_autodiff());
+
+        let style = Tensor::<2>::ones([1, 6], &device).require_grad();
+        let gradients = decode(style.clone()).square().sum().backward();
+        let gradient = host_values(&style.grad(&gradients).unwrap());
+        assert!(gradient.iter().any(|&g| g != 0.0));
     }
 
     #[test]
