@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use burn::tensor::Device;
 use object_pba::{
     bundle_adjustment::{
@@ -72,11 +72,11 @@ fn compare(
     config: &BundleAdjustmentConfig,
     device: &Device,
 ) -> Result<[Arm; 3]> {
-    let guess = InitialGuess::of_sequence(prior, sequence, config.initial_style)
-        .with_context(|| format!("{}: the reference frame's mask is empty", sequence.name))?;
+    let with_prior = InitialGuess::hypotheses(prior, sequence, config);
+    if with_prior.is_empty() {
+        bail!("{}: the reference frame's mask is empty", sequence.name);
+    }
     let generator = &prior.shape.generator;
-    let n_frames = sequence.frames.len();
-    let with_prior = guess.hypotheses(n_frames, config.objective.parameterisation);
     let cloud = points(generator, &with_prior[0].unknowns, device);
     let free = |start: &Hypothesis| Hypothesis {
         unknowns: start.unknowns.with_style(host_points(&cloud).as_flattened()),

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     bundle_adjustment::{
-        Hypothesis,
+        BundleAdjustmentConfig, Hypothesis,
         unknowns::{Parameterisation, Unknowns},
     },
     checkpoint::Prior,
@@ -34,6 +34,17 @@ pub enum InitialStyle {
     Median,
 }
 
+/// Where the frames after the reference start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InitialMotion {
+    /// At the reference pose, Δp_l = 0, as in the paper.
+    Still,
+    /// At the regressed pose that is nearest to that of the frame before.
+    #[default]
+    Regressed,
+}
+
 /// Where bundle adjustment starts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
@@ -53,6 +64,9 @@ pub struct InitialGuess {
     pub poses: Vec<(Isometry3<f32>, f32)>,
 }
 
+/// Turn from one frame to the next, in radians, beyond which a regressed pose is not believed.
+const LARGEST_TURN: f32 = 0.5;
+
 impl InitialGuess {
     /// Regresses from one frame; `None` when its mask is empty.
     pub fn of_frame(prior: &Prior, sequence: &Sequence, frame: &Frame) -> Option<Self> {
@@ -66,36 +80,65 @@ impl InitialGuess {
         Some(Self { style: guess.style, poses })
     }
 
-    /// Regresses the poses from the reference frame; `None` when its mask is empty.
-    pub fn of_sequence(prior: &Prior, sequence: &Sequence, style: InitialStyle) -> Option<Self> {
-        let (reference, others) = sequence.frames.split_first()?;
-        let mut guess = Self::of_frame(prior, sequence, reference)?;
-        let pool: fn(Vec<f32>) -> f32 = match style {
-            InitialStyle::Reference => return Some(guess),
-            InitialStyle::Mean => mean,
-            InitialStyle::Median => median,
+    /// What bundle adjustment tries: each pose of the reference frame that is not too unlikely. None
+    /// where its mask is empty.
+    pub fn hypotheses(
+        prior: &Prior,
+        sequence: &Sequence,
+        config: &BundleAdjustmentConfig,
+    ) -> Vec<Hypothesis> {
+        let regress = |frame| Self::of_frame(prior, sequence, frame);
+        let alone = config.initial_style == InitialStyle::Reference
+            && config.initial_motion == InitialMotion::Still;
+        let n_seen = if alone { 1 } else { sequence.frames.len() };
+        let guesses: Vec<_> = sequence.frames[..n_seen].iter().map(regress).collect();
+        let Some(Some(reference)) = guesses.first() else { return Vec::new() };
+        let style = pooled_style(&guesses, config.initial_style);
+
+        let parameterisation = config.objective.parameterisation;
+        let unknowns = |pose: Isometry3<f32>| match config.initial_motion {
+            InitialMotion::Still => {
+                Unknowns::new(pose, sequence.frames.len(), &style, parameterisation)
+            }
+            InitialMotion::Regressed => {
+                Unknowns::with_poses(&followed(pose, &guesses[1..]), &style, parameterisation)
+            }
         };
-        let others = others.iter().filter_map(|frame| Self::of_frame(prior, sequence, frame));
-        let mut styles: Vec<_> = others.map(|guess| guess.style).collect();
-        styles.push(guess.style);
-        let direction = |i: usize| pool(styles.iter().map(|style| style[i]).collect());
-        guess.style = (0..styles[0].len()).map(direction).collect();
-        Some(guess)
+        let hypothesis = |&(pose, confidence)| Hypothesis { unknowns: unknowns(pose), confidence };
+        reference.likely_poses().map(hypothesis).collect()
     }
 
-    /// What bundle adjustment tries: Δp_l = 0, and each pose that is not too unlikely.
-    pub fn hypotheses(
-        &self,
-        n_frames: usize,
-        parameterisation: Parameterisation,
-    ) -> Vec<Hypothesis> {
-        let start = |&(pose, confidence): &(Isometry3<f32>, f32)| Hypothesis {
-            unknowns: Unknowns::new(pose, n_frames, &self.style, parameterisation),
-            confidence,
-        };
+    /// Those of the poses that are not too unlikely.
+    fn likely_poses(&self) -> impl Iterator<Item = &(Isometry3<f32>, f32)> {
         let least = LEAST_CONFIDENCE * self.poses[0].1;
-        self.poses.iter().filter(|(_, confidence)| *confidence >= least).map(start).collect()
+        self.poses.iter().filter(move |(_, confidence)| *confidence >= least)
     }
+}
+
+/// A pose for each frame, from the reference's on: the one of its own that is nearest to that of the
+/// frame before, so that all are turned round or none is.
+fn followed(reference: Isometry3<f32>, others: &[Option<InitialGuess>]) -> Vec<Isometry3<f32>> {
+    let mut poses = vec![reference];
+    for guess in others {
+        let last = poses[poses.len() - 1];
+        let turn = |pose: &Isometry3<f32>| last.rotation.angle_to(&pose.rotation);
+        let own = guess.iter().flat_map(|guess| &guess.poses).map(|(pose, _)| *pose);
+        let nearest = own.min_by(|a, b| turn(a).total_cmp(&turn(b)));
+        poses.push(nearest.filter(|pose| turn(pose) < LARGEST_TURN).unwrap_or(last));
+    }
+    poses
+}
+
+/// The first frame's style, or that of all frames, direction by direction.
+fn pooled_style(guesses: &[Option<InitialGuess>], style: InitialStyle) -> Vec<f32> {
+    let styles: Vec<_> = guesses.iter().flatten().map(|guess| &guess.style).collect();
+    let pool: fn(Vec<f32>) -> f32 = match style {
+        InitialStyle::Reference => return styles[0].clone(),
+        InitialStyle::Mean => mean,
+        InitialStyle::Median => median,
+    };
+    let direction = |i: usize| pool(styles.iter().map(|style| style[i]).collect());
+    (0..styles[0].len()).map(direction).collect()
 }
 
 /// The true poses, and the style of the true shape; `None` where either is unknown.
@@ -127,6 +170,7 @@ fn median(mut values: Vec<f32>) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
 
     #[test]
     fn a_median_ignores_what_lies_far_off() {
@@ -135,10 +179,43 @@ mod tests {
         assert_eq!(median(vec![7.0]), 7.0);
     }
 
+    fn turned(degrees: f32) -> Isometry3<f32> {
+        Isometry3::new(Vector3::z() * 2.0, Vector3::y() * degrees.to_radians())
+    }
+
+    fn guess(poses: &[f32]) -> Option<InitialGuess> {
+        let poses = poses.iter().map(|&degrees| (turned(degrees), 0.5)).collect();
+        Some(InitialGuess { style: vec![0.0], poses })
+    }
+
     #[test]
     fn only_poses_that_are_likely_enough_are_tried() {
         let poses = [0.6, 0.2, 0.1].map(|confidence| (Isometry3::identity(), confidence));
         let guess = InitialGuess { style: vec![0.0; 3], poses: poses.to_vec() };
-        assert_eq!(guess.hypotheses(2, Parameterisation::default()).len(), 2);
+        assert_eq!(guess.likely_poses().count(), 2);
+    }
+
+    #[test]
+    fn frames_follow_the_reference_whichever_way_round_it_is() {
+        let others = [guess(&[5.0, 183.0]), None, guess(&[196.0, 8.0]), guess(&[90.0])];
+        for (start, expected) in
+            [(0.0, [0.0, 5.0, 5.0, 8.0, 8.0]), (180.0, [180.0, 183.0, 183.0, 196.0, 196.0])]
+        {
+            let poses = followed(turned(start), &others);
+            for (pose, degrees) in poses.iter().zip(expected) {
+                assert!(pose.rotation.angle_to(&turned(degrees).rotation) < 1e-3, "{poses:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_style_is_the_reference_s_or_pooled_over_what_was_seen() {
+        let of_style = |value: f32| Some(InitialGuess { style: vec![value], poses: Vec::new() });
+        let guesses = [of_style(1.0), None, of_style(2.0), of_style(6.0)];
+        let pooled = |style| pooled_style(&guesses, style)[0];
+        assert_eq!(
+            [InitialStyle::Reference, InitialStyle::Mean, InitialStyle::Median].map(pooled),
+            [1.0, 3.0, 2.0]
+        );
     }
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     bundle_adjustment::{
-        BundleAdjustmentConfig, Outcome, Step, bundle_adjust,
+        BundleAdjustmentConfig, Hypothesis, Outcome, Step, bundle_adjust,
         objective::{Objective, ObjectiveConfig},
         observations::Observations,
         shape_model::ShapeModel,
@@ -28,14 +28,16 @@ pub fn reconstruct(
     device: &Device,
     observe: &mut dyn FnMut(&Step, &Unknowns),
 ) -> Option<Outcome> {
-    let parameterisation = config.objective.parameterisation;
     let hypotheses = match config.start {
-        Start::Regressors => {
-            let guess = InitialGuess::of_sequence(prior, sequence, config.initial_style)?;
-            guess.hypotheses(sequence.frames.len(), parameterisation)
+        Start::Regressors => InitialGuess::hypotheses(prior, sequence, config),
+        Start::Truth => {
+            let unknowns = true_unknowns(prior, sequence, config.objective.parameterisation);
+            unknowns.map(Hypothesis::from).into_iter().collect()
         }
-        Start::Truth => vec![true_unknowns(prior, sequence, parameterisation)?.into()],
     };
+    if hypotheses.is_empty() {
+        return None;
+    }
     let generator = &prior.shape.generator;
     Some(bundle_adjust(sequence, generator, &hypotheses, config, device, observe))
 }

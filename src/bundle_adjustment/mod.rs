@@ -44,7 +44,7 @@ pub use self::{
 };
 use crate::{
     data::sequence::Sequence,
-    initial_guess::{InitialStyle, Start},
+    initial_guess::{InitialMotion, InitialStyle, Start},
 };
 
 /// Levels of blur after which hypotheses are not compared yet: coarsely, a car turned round fits as well.
@@ -84,6 +84,7 @@ pub struct BundleAdjustmentConfig {
     pub drop_margin: f64,
     pub start: Start,
     pub initial_style: InitialStyle,
+    pub initial_motion: InitialMotion,
     pub objective: ObjectiveConfig,
     pub adam: AdamConfig,
     pub lm: LevenbergMarquardtConfig,
@@ -100,6 +101,7 @@ impl Default for BundleAdjustmentConfig {
             drop_margin: 5.0,
             start: Start::default(),
             initial_style: InitialStyle::default(),
+            initial_motion: InitialMotion::default(),
             objective: ObjectiveConfig::default(),
             adam: AdamConfig::default(),
             lm: LevenbergMarquardtConfig::default(),
@@ -133,6 +135,7 @@ impl BundleAdjustmentConfig {
             solver: Solver::AlternatingLbfgs,
             blurs: vec![0.0],
             n_hypotheses: 1,
+            initial_motion: InitialMotion::Still,
             objective: ObjectiveConfig::paper(),
             ..Self::default()
         }
