@@ -66,7 +66,7 @@ pub fn evaluate(dataset: &Path, out: &Path, options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Works on as many items as there are cores, each on one of them, and keeps their order.
+/// Works on as many items as there are cores, each on its share of them, and keeps their order.
 ///
 /// In one pool, a core that waits for its share of an item would take up another one meanwhile: more
 /// and more would be under way, each with its memory, and none would be timed right.
@@ -74,10 +74,12 @@ fn side_by_side<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync) ->
     let style = "{bar:30} {pos}/{len} {elapsed_precise} (ETA {eta})";
     let style = ProgressStyle::with_template(style).expect("a valid template");
     let bar = ProgressBar::new(items.len() as u64).with_style(style);
-    let n_workers = rayon::current_num_threads().min(items.len());
+    let n_cores = rayon::current_num_threads();
+    let n_workers = n_cores.min(items.len());
     let next = AtomicUsize::new(0);
     let work_alone = || {
-        let pool = ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can start");
+        let pool = ThreadPoolBuilder::new().num_threads(n_cores / n_workers).build();
+        let pool = pool.expect("threads can start");
         let mut done = Vec::new();
         loop {
             let idx = next.fetch_add(1, Ordering::Relaxed);

@@ -21,6 +21,8 @@ use crate::{
 /// Share of the likeliest pose's confidence that another needs to be tried: front and back look alike
 /// coarsely, and where the regressor is sure, it is more often right than a coarse fit.
 const LEAST_CONFIDENCE: f32 = 0.2;
+/// Turn from one frame to the next, in radians, beyond which a regressed pose is not believed.
+const LARGEST_TURN: f32 = 0.5;
 
 /// Which frames the initial style is regressed from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -63,9 +65,6 @@ pub struct InitialGuess {
     /// `camera_from_world`, likeliest first, with the regressor's confidences.
     pub poses: Vec<(Isometry3<f32>, f32)>,
 }
-
-/// Turn from one frame to the next, in radians, beyond which a regressed pose is not believed.
-const LARGEST_TURN: f32 = 0.5;
 
 impl InitialGuess {
     /// Regresses from one frame; `None` when its mask is empty.

@@ -66,6 +66,7 @@ impl<'a> Rows<'a> {
         rows.extend(b.as_slice());
         self.residuals.push(weight * residual);
     }
+
     /// JᵀJ and Jᵀr.
     pub fn squared(self) -> (DMatrix<f64>, DVector<f64>) {
         let residuals = DVector::from_vec(self.residuals);
