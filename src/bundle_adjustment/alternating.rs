@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     evaluation::Evaluation,
-    lbfgs::{LbfgsConfig, Sample, minimise},
+    lbfgs::{LbfgsConfig, Minimum, minimise},
     objective::Objective,
     progress::{Ending, Progress, Status},
     shape_model::KnownPoints,
@@ -85,7 +85,7 @@ fn update_relative_poses(
 ) {
     let style = unknowns.leaves(&objective.device.clone().inner()).style;
     let points = objective.shape.points(style).inner();
-    let updated: Vec<Sample> = (1..unknowns.n_frames())
+    let updated: Vec<Minimum> = (1..unknowns.n_frames())
         .into_par_iter()
         .map(|l| {
             let shape = KnownPoints(points.clone());
@@ -98,8 +98,8 @@ fn update_relative_poses(
             minimise(cost, &unknowns.values[range], config)
         })
         .collect();
-    for (l, sample) in (1..).zip(updated) {
-        unknowns.values[Unknowns::relative(l)].copy_from_slice(&sample.x);
+    for (l, minimum) in (1..).zip(updated) {
+        unknowns.values[Unknowns::relative(l)].copy_from_slice(&minimum.x);
     }
 }
 
