@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{
     BundleAdjustmentConfig, Solver,
     adam::Adam,
-    alternating, levenberg_marquardt,
+    alternating, joint_lbfgs, levenberg_marquardt,
     objective::Objective,
     progress::{Ending, Progress, Status},
     unknowns::Unknowns,
@@ -82,6 +82,7 @@ impl Run {
             Solver::Lm => {
                 levenberg_marquardt::run(objective, unknowns, level, &config.lm, progress)
             }
+            Solver::Lbfgs => joint_lbfgs::run(objective, unknowns, level, &config.lbfgs, progress),
             Solver::AlternatingLbfgs => {
                 alternating::run(objective, unknowns, level, &config.alternating, progress)
             }

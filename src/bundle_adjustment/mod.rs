@@ -6,6 +6,7 @@ mod color_slope;
 pub mod correspondences;
 mod evaluation;
 mod hypotheses;
+pub mod joint_lbfgs;
 pub mod lbfgs;
 pub mod levenberg_marquardt;
 mod linearisation;
@@ -28,6 +29,7 @@ use self::{
     adam::AdamConfig,
     alternating::AlternatingConfig,
     hypotheses::{Run, drop_those_behind},
+    joint_lbfgs::JointLbfgsConfig,
     levenberg_marquardt::LevenbergMarquardtConfig,
     objective::{Objective, ObjectiveConfig},
     observations::Observations,
@@ -59,6 +61,8 @@ pub enum Solver {
     Lm,
     /// All unknowns together, by Adam.
     Adam,
+    /// All unknowns together, by L-BFGS.
+    Lbfgs,
     /// Algorithm 1 as printed: L-BFGS on each Δp_l in parallel, then p_0, then s.
     AlternatingLbfgs,
 }
@@ -88,6 +92,7 @@ pub struct BundleAdjustmentConfig {
     pub objective: ObjectiveConfig,
     pub adam: AdamConfig,
     pub lm: LevenbergMarquardtConfig,
+    pub lbfgs: JointLbfgsConfig,
     pub alternating: AlternatingConfig,
 }
 
@@ -105,6 +110,7 @@ impl Default for BundleAdjustmentConfig {
             objective: ObjectiveConfig::default(),
             adam: AdamConfig::default(),
             lm: LevenbergMarquardtConfig::default(),
+            lbfgs: JointLbfgsConfig::default(),
             alternating: AlternatingConfig::default(),
         }
     }
@@ -114,7 +120,7 @@ impl BundleAdjustmentConfig {
     /// What suits a solver: ours, or the paper's.
     pub fn preset(solver: Solver) -> Self {
         match solver {
-            Solver::Lm | Solver::Adam => Self { solver, ..Self::default() },
+            Solver::Lm | Solver::Adam | Solver::Lbfgs => Self { solver, ..Self::default() },
             Solver::AlternatingLbfgs => Self::paper(),
         }
     }
@@ -124,6 +130,7 @@ impl BundleAdjustmentConfig {
         let per_level = match self.solver {
             Solver::Adam => self.adam.iterations + 1,
             Solver::Lm => self.lm.iterations + 1,
+            Solver::Lbfgs => self.lbfgs.iterations + 1,
             Solver::AlternatingLbfgs => 3 * self.alternating.max_rounds + 1,
         };
         per_level * self.n_hypotheses.max(1) * self.blurs.len()

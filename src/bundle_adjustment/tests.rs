@@ -5,8 +5,8 @@ use nalgebra::{Isometry3, Translation3};
 
 use super::{
     BundleAdjustmentConfig, Outcome, Solver, Status, adam::AdamConfig,
-    alternating::AlternatingConfig, bundle_adjust, lbfgs::LbfgsConfig, shape_model::KnownPoints,
-    unknowns::Unknowns,
+    alternating::AlternatingConfig, bundle_adjust, joint_lbfgs::JointLbfgsConfig,
+    lbfgs::LbfgsConfig, shape_model::KnownPoints, unknowns::Unknowns,
 };
 use crate::{
     data::{
@@ -16,7 +16,7 @@ use crate::{
     device::Backend,
 };
 
-const SOLVERS: [Solver; 3] = [Solver::Lm, Solver::Adam, Solver::AlternatingLbfgs];
+const SOLVERS: [Solver; 4] = [Solver::Lm, Solver::Adam, Solver::Lbfgs, Solver::AlternatingLbfgs];
 
 /// Runs each solver on its own objective from the true poses, each of them changed.
 fn adjusted(change: impl Fn(&mut Sequence, &mut Isometry3<f32>)) -> Vec<Outcome> {
@@ -34,6 +34,7 @@ fn adjusted(change: impl Fn(&mut Sequence, &mut Isometry3<f32>)) -> Vec<Outcome>
     let adjust = |solver| {
         let config = BundleAdjustmentConfig {
             adam: AdamConfig { iterations: 5, ..Default::default() },
+            lbfgs: JointLbfgsConfig { evaluations: 5, ..Default::default() },
             alternating: AlternatingConfig {
                 max_rounds: 1,
                 lbfgs: LbfgsConfig { max_evaluations: 3, ..Default::default() },
