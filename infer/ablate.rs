@@ -20,13 +20,16 @@ use object_pba::{
 
 use crate::{Options, figures, input::Input, output};
 
-/// Step size of a free point in world units, a tenth of the spacing of 6,144 points on a car.
+/// Step size or scale of a free point in world units, a tenth of the spacing of 6,144 points on a car.
 const POINT_RATE: f64 = 2e-3;
 
 pub fn ablate(sequences: &[std::path::PathBuf], out: &Path, options: &Options) -> Result<()> {
     let mut config = options.bundle_adjustment()?;
-    // Free points are too many for second-order steps, and both arms share a solver.
+    // Both arms share a solver, so it has to be one for any number of unknowns.
     if config.solver == Solver::Lm {
+        eprintln!(
+            "note: lm solves for few directions of a shape, not for free points: both arms use adam"
+        );
         config.solver = Solver::Adam;
     }
     let device = options.device.device().autodiff();
@@ -87,6 +90,7 @@ fn compare(
     let mut free_config = config.clone();
     free_config.objective.style_weight = 0.0;
     free_config.adam.style_rate = POINT_RATE;
+    free_config.lbfgs.style_scale = POINT_RATE;
     let arm = |shape: &dyn ShapeModel, unknowns: &Unknowns| Arm {
         scores: score(sequence, shape, unknowns, device),
         picture: picture(sequence, shape, unknowns, config, device),

@@ -143,6 +143,51 @@ fn estimated_cameras_are_a_sequence_of_the_same_convention() {
     assert_eq!(frames(&given), frames(&estimated));
 }
 
+/// A configuration in which each solver takes a step or two.
+const HASTY: &str = "
+    blurs = [0.0]
+    n_hypotheses = 1
+    adam = { iterations = 2 }
+    lbfgs = { evaluations = 12, relative_first = 0 }
+    alternating = { max_rounds = 1, lbfgs = { max_evaluations = 3 } }
+";
+
+/// Ablates the sample; the cells of the table's style error, and what went to stderr.
+fn ablated(solver: &str, expected: &str) -> ([String; 3], String) {
+    let folder = TempDir::new().unwrap();
+    let (hasty, out) = (folder.path().join("hasty.toml"), folder.path().join("ablation"));
+    fs::write(&hasty, HASTY).unwrap();
+    let sequence = sample();
+    let [path, hasty, out] = [sequence.path(), &hasty, &out].map(|path| path.to_str().unwrap());
+    let arguments = ["--out", out, "--config", hasty, "--solver", solver];
+    let output = pba_infer(&[&["ablate", path], &arguments[..]].concat());
+    let messages = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{messages}");
+    let config = fs::read_to_string(Path::new(out).join("config.toml")).unwrap();
+    assert!(config.contains(&format!("solver = \"{expected}\"")), "{config}");
+    let table = fs::read_to_string(Path::new(out).join("table.md")).unwrap();
+    let row = table.lines().find(|line| line.contains("style error")).unwrap();
+    let cells: Vec<String> = row.split('|').map(|cell| cell.trim().into()).collect();
+    ([cells[3].clone(), cells[4].clone(), cells[5].clone()], messages)
+}
+
+#[test]
+fn both_arms_of_the_ablation_move_under_each_solver() {
+    for solver in ["adam", "lbfgs", "alternating-lbfgs"] {
+        let ([initial, with_prior, free], messages) = ablated(solver, solver);
+        let cells = [&initial, &with_prior, &free];
+        assert!(cells.iter().all(|cell| cell.parse::<f64>().is_ok()), "{cells:?}");
+        assert!(initial != with_prior && initial != free && with_prior != free, "{cells:?}");
+        assert!(!messages.contains("note:"), "{messages}");
+    }
+}
+
+#[test]
+fn the_ablation_says_when_it_does_not_use_lm() {
+    let (_, messages) = ablated("lm", "adam");
+    assert!(messages.contains("lm") && messages.contains("adam"), "{messages}");
+}
+
 #[test]
 fn a_missing_frame_is_named() {
     let sequence = sample();
