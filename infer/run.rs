@@ -72,6 +72,10 @@ impl UncertaintyReport {
 /// A finished reconstruction, with all that figures are made from.
 pub struct Reconstruction {
     pub outcome: Outcome,
+/// Why there is nothing to start from, and what helps. Other frames may do without masks.
+pub const NO_REFERENCE_MASK: &str = "the first frame, to which all others refer, has no mask or an empty one; \
+    give it one (mask_path, masks/, --masks or an alpha channel), or begin with a frame that has one (--frames)";
+
     pub history: Vec<Step>,
     pub report: Report,
 }
@@ -129,7 +133,7 @@ pub fn reconstruct_and_score(
         observe(step, unknowns);
     });
     let missing = match config.start {
-        Start::Regressors => "the reference frame's mask is empty",
+        Start::Regressors => NO_REFERENCE_MASK,
         Start::Truth => "its true poses and points, to start from, are not known",
     };
     let outcome = outcome.with_context(|| format!("{}: {missing}", sequence.name))?;

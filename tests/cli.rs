@@ -160,6 +160,35 @@ fn a_frame_of_another_size_is_named() {
 }
 
 #[test]
+fn frames_may_lack_masks_and_the_reference_may_not() {
+    let sequence = sample();
+    let quick = sequence.path().join("quick.toml");
+    fs::write(&quick, "blurs = [1.0]\n[lm]\niterations = 2\n").unwrap();
+    let arguments = ["--config", quick.to_str().unwrap()];
+    let mask = |frame: usize| sequence.path().join(format!("masks/frame_{frame:03}.png"));
+    fs::remove_file(mask(3)).unwrap();
+    image::GrayImage::new(128, 128).save(mask(7)).unwrap();
+    let out = TempDir::new().unwrap();
+    let [path, folder] = [&sequence, &out].map(|folder| folder.path().to_str().unwrap());
+    let output = pba_infer(&[&["run", path, "--out", folder], &arguments[..]].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    let note = "2 of 15 frames have no mask, or an empty one; the first is images/frame_003.png";
+    assert!(message.contains(note), "{message}");
+    let metrics = fs::read_to_string(out.path().join("metrics.json")).unwrap();
+    let metrics: Value = serde_json::from_str(&metrics).unwrap();
+    let error = |state: &str| metrics[state]["rotation_error_deg_mean"].as_f64().unwrap();
+    assert!(error("final") < error("initial"), "{metrics}");
+
+    (0..15).for_each(|frame| drop(fs::remove_file(mask(frame))));
+    let missing = ["first frame", "no mask", "--masks", "--frames"];
+    check_refused(&run(sequence.path(), &arguments), &missing);
+    let from_truth = [&arguments[..], &["--start", "truth"]].concat();
+    let output = run(sequence.path(), &from_truth);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
 fn a_truncated_frame_is_named() {
     let sequence = sample();
     let path = sequence.path().join("images/frame_001.png");
