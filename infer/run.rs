@@ -7,8 +7,8 @@ use burn::tensor::Device;
 use indicatif::{ProgressBar, ProgressStyle};
 use object_pba::{
     bundle_adjustment::{
-        BundleAdjustmentConfig, HypothesisReport, Outcome, Solver, Status, Step, Uncertainty,
-        WithinTwoSigma, unknowns::Unknowns,
+        BundleAdjustmentConfig, Exposure, HypothesisReport, Outcome, Solver, Status, Step,
+        Uncertainty, WithinTwoSigma, unknowns::Unknowns,
     },
     checkpoint::Prior,
     data::sequence::Sequence,
@@ -36,6 +36,9 @@ pub struct Report {
     pub status: Status,
     pub hypotheses: Vec<HypothesisReport>,
     pub uncertainty: Option<UncertaintyReport>,
+    /// Each target frame's gain and bias, where they are solved for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposures: Option<Vec<Exposure>>,
 }
 
 /// Standard deviations: roots of expected squared errors. `null` where the solver knows none.
@@ -69,13 +72,13 @@ impl UncertaintyReport {
     }
 }
 
-/// A finished reconstruction, with all that figures are made from.
-pub struct Reconstruction {
-    pub outcome: Outcome,
 /// Why there is nothing to start from, and what helps. Other frames may do without masks.
 pub const NO_REFERENCE_MASK: &str = "the first frame, to which all others refer, has no mask or an empty one; \
     give it one (mask_path, masks/, --masks or an alpha channel), or begin with a frame that has one (--frames)";
 
+/// A finished reconstruction, with all that figures are made from.
+pub struct Reconstruction {
+    pub outcome: Outcome,
     pub history: Vec<Step>,
     pub report: Report,
 }
@@ -152,6 +155,7 @@ pub fn reconstruct_and_score(
         solver: config.solver,
         status: outcome.status,
         hypotheses: outcome.hypotheses.clone(),
+        exposures: outcome.exposures.clone(),
         uncertainty: outcome
             .uncertainty
             .as_ref()

@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Vector2, Vector3};
 use rayon::prelude::*;
 
 use super::{
+    exposure::Exposure,
     objective::{ObjectiveConfig, Reduction},
     observations::Observations,
 };
@@ -33,6 +34,8 @@ pub struct Correspondences {
     pub comparable: Vec<Vec<f32>>,
     /// The silhouette's pairs, each list with its place in `frames`.
     pub pairs: Vec<(usize, Vec<SilhouettePair>)>,
+    /// How each target is exposed.
+    pub exposures: Vec<Exposure>,
 }
 
 impl Correspondences {
@@ -63,7 +66,9 @@ impl Correspondences {
             })
             .collect();
         let pairs = pairs(observations, &frames, &pixels, &visible, config, level);
-        Self { frames, points, pixels, n_in_frame, n_behind, visible, comparable, pairs }
+        // Colours tell, which are the graph's.
+        let exposures = vec![Exposure::NEUTRAL; frames.len() - 1];
+        Self { frames, points, pixels, n_in_frame, n_behind, visible, comparable, pairs, exposures }
     }
 
     /// Whether every point lands somewhere.

@@ -49,7 +49,8 @@ impl Linearisation<'_> {
         rows
     }
 
-    /// I_0(u_0) − I_l(u_l) of every point that may be compared, reweighted by Charbonnier's loss.
+    /// I_0(u_0) − I_l(u_l), exposed alike, of every point that may be compared, reweighted by
+    /// Charbonnier's loss.
     fn photometric_rows(&self, frame: usize, rows: &mut Rows) {
         let comparable = &self.matches.comparable[frame - 1];
         let seen = &self.matches.visible[0];
@@ -61,12 +62,14 @@ impl Linearisation<'_> {
         };
         let share = stride as f64 * f64::from(self.config.photometric_weight) / count;
         let images = &self.observations.host_images[self.level];
+        let exposure = self.matches.exposures[frame - 1];
+        let mut by_exposure = Vec::new();
         for &j in used.iter().step_by(stride) {
             let point = seen[j] as usize;
             let [at, there] = [0, frame].map(|f| self.matches.pixels[f][point]);
             let (color, slope) = color_and_slope(&images[0], at);
             let (target, target_slope) = color_and_slope(&images[frame], there);
-            let residual: [f64; 3] = std::array::from_fn(|c| color[c] - target[c]);
+            let residual = exposure.residual(&[color, target]);
             let squared: f64 = residual.iter().map(|r| r * r).sum();
             let robust = match f64::from(self.config.robust_scale) {
                 scale if scale > 0.0 => (1.0 + squared / (scale * scale)).sqrt().recip(),
@@ -77,7 +80,18 @@ impl Linearisation<'_> {
             for c in 0..3 {
                 let in_reference = self.by_camera_point(&placed.in_reference, slope[c]);
                 let in_frame = self.by_camera_point(&placed.in_frame, target_slope[c]);
-                rows.push(&placed, [in_reference, -in_frame], residual[c], weight);
+                let by_points = [in_reference, -in_frame * exposure.gain];
+                rows.push(&placed, by_points, residual[c], weight);
+                by_exposure.push([-target[c] * weight, -weight]);
+            }
+        }
+        if self.config.solve_exposure {
+            let by_gain = by_exposure.iter().map(|[by_gain, _]| *by_gain);
+            let by_bias = by_exposure.iter().map(|[_, by_bias]| *by_bias);
+            if exposure.gain_is_free() {
+                rows.eliminate(&[by_bias.collect(), by_gain.collect()]);
+            } else {
+                rows.eliminate(&[by_bias.collect()]);
             }
         }
     }

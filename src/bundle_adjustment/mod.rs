@@ -5,6 +5,7 @@ pub mod alternating;
 mod color_slope;
 pub mod correspondences;
 mod evaluation;
+mod exposure;
 mod hypotheses;
 pub mod lbfgs;
 pub mod levenberg_marquardt;
@@ -12,6 +13,7 @@ mod linearisation;
 mod normal_equations;
 pub mod objective;
 pub mod observations;
+mod photometric;
 mod progress;
 mod rows;
 mod shape_jacobian;
@@ -38,6 +40,7 @@ use self::{
 };
 pub use self::{
     evaluation::Evaluation,
+    exposure::Exposure,
     hypotheses::{Hypothesis, HypothesisReport},
     progress::{Status, Step},
     uncertainty::{Uncertainty, WithinTwoSigma},
@@ -152,6 +155,8 @@ pub struct Outcome {
     pub iterations: usize,
     /// What became of each initial guess that was tried, in their order.
     pub hypotheses: Vec<HypothesisReport>,
+    /// How each target frame is exposed, at the last level of blur, where that is solved for.
+    pub exposures: Option<Vec<Exposure>>,
     /// Of what was found; Levenberg–Marquardt alone knows it.
     pub uncertainty: Option<Uncertainty>,
 }
@@ -203,7 +208,9 @@ pub fn bundle_adjust(
         uncertainty(&objective, &unknowns, last_level, &config.lm, n_observations)
     };
     let known = config.solver == Solver::Lm && !report.status.is_fault();
+    let exposures = || objective.value(&unknowns, last_level).1.exposures;
     Outcome {
+        exposures: config.objective.solve_exposure.then(exposures),
         uncertainty: known.then(certain).flatten(),
         unknowns,
         status: report.status,

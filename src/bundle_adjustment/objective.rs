@@ -1,6 +1,6 @@
 //! L = L_ph + λ L_CD (Eq. 6), with what later work added to make it well behaved.
 
-use burn::tensor::{Device, Tensor, TensorData, s};
+use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -13,7 +13,7 @@ use super::{
 use crate::{
     camera::Pose,
     host::index_tensor,
-    loss::{SilhouettePair, charbonnier, silhouette_distances},
+    loss::{SilhouettePair, silhouette_distances},
     pseudo_render::{Footprint, PseudoRenderConfig},
 };
 
@@ -39,7 +39,10 @@ pub struct ObjectiveConfig {
     pub photometric_weight: f32,
     /// Charbonnier scale of a colour difference, RGB in [0, 1]; 0 takes plain squares.
     pub robust_scale: f32,
-    /// Compare colours only where both points fall inside their frames' masks.
+    /// Take each target frame to be exposed anew, and find the one gain and bias, shared by its channels,
+    /// with which its colours agree best with the reference's.
+    pub solve_exposure: bool,
+    /// Compare colours only where both points fall inside their frames' masks, where there are any.
     pub within_masks: bool,
     /// Compare colours only where the target frame, too, sees the point.
     pub target_occlusion: bool,
@@ -72,6 +75,7 @@ impl Default for ObjectiveConfig {
             reduction: Reduction::Mean,
             photometric_weight: 1000.0,
             robust_scale: 0.05,
+            solve_exposure: false,
             within_masks: true,
             target_occlusion: true,
             silhouette_weight: 40.0,
@@ -95,6 +99,7 @@ impl ObjectiveConfig {
             reduction: Reduction::Sum,
             photometric_weight: 1.0,
             robust_scale: 0.0,
+            solve_exposure: false,
             within_masks: false,
             target_occlusion: false,
             silhouette_weight: 0.01,
@@ -191,12 +196,11 @@ impl Objective<'_> {
         let frame_idx = frames.iter().map(|&frame| frame as i64).collect();
         let poses = unknowns.poses(leaves).select(index_tensor(frame_idx, &points_in_world));
         let cloud = (&points_in_world, &poses);
-        let matches = Correspondences::new(self.observations, frames, cloud, self.config, level);
-        Terms {
-            photometric: self.photometric(&matches, cloud, level),
-            silhouette: self.silhouette(&matches, cloud),
-            matches,
-        }
+        let mut matches =
+            Correspondences::new(self.observations, frames, cloud, self.config, level);
+        let (photometric, exposures) = self.photometric(&matches, cloud, level);
+        matches.exposures = exposures;
+        Terms { photometric, silhouette: self.silhouette(&matches, cloud), matches }
     }
 
     /// L_CD (Eq. 5), over the frames that have a silhouette.
@@ -218,46 +222,14 @@ impl Objective<'_> {
     }
 
     /// Where some points land in each view, `[views, points, 2]`.
-    fn pixels(&self, points: &Tensor<3>, point_idx: Vec<i64>, poses: &Pose) -> Tensor<3> {
+    pub(super) fn pixels(
+        &self,
+        points: &Tensor<3>,
+        point_idx: Vec<i64>,
+        poses: &Pose,
+    ) -> Tensor<3> {
         let points = points.clone().select(1, index_tensor(point_idx, points));
         self.observations.intrinsics.project(poses.camera_from_world(points)).pixels
-    }
-
-    /// L_ph (Eq. 3), over the points that the reference frame sees.
-    fn photometric(
-        &self,
-        matches: &Correspondences,
-        (points, poses): (&Tensor<3>, &Pose),
-        level: usize,
-    ) -> Tensor<1> {
-        let [_, n, _] = points.dims();
-        let (n_targets, seen) = (matches.frames.len() - 1, &matches.visible[0]);
-        if n_targets == 0 {
-            return Tensor::zeros([1], &points.device());
-        }
-        if seen.is_empty() {
-            // Nothing to compare is the worst that can be, not the best: all three channels of
-            // every point are as wrong as colours can be.
-            let worst = match self.config.reduction {
-                Reduction::Sum => 3.0 * (n_targets * n) as f32,
-                Reduction::Mean => 3.0,
-            };
-            return Tensor::from_floats([worst], &points.device());
-        }
-        let pixels = self.pixels(points, seen.iter().map(|&i| i64::from(i)).collect(), poses);
-        let images = &self.observations.images[level];
-        let colors = images.sample_bilinear(&matches.frames, pixels);
-        let residuals = colors.clone().slice(s![0..1]) - colors.slice(s![1..]); // [t, m, 3]
-        let mut squared = residuals.square().sum_dim(2).squeeze_dim::<2>(2);
-        if self.config.robust_scale > 0.0 {
-            squared = charbonnier(squared, self.config.robust_scale);
-        }
-        let weights = TensorData::new(matches.comparable.concat(), [n_targets, seen.len()]);
-        let sum = (squared * Tensor::from_data(weights, &self.device.clone().inner())).sum();
-        match self.config.reduction {
-            Reduction::Sum => sum,
-            Reduction::Mean => sum / matches.n_compared(),
-        }
     }
 }
 
