@@ -150,7 +150,8 @@ fn pairs(
                 Reduction::Mean => [silhouette.pixels.len(), visible.len()].map(|n| 1.0 / n as f32),
             };
             let to_outline = config.silhouette_outline;
-            let matching = SilhouetteMatching { to_outline, weights, tolerances };
+            let trim = config.silhouette_trim;
+            let matching = SilhouetteMatching { to_outline, weights, tolerances, trim };
             Some((f, silhouette_pairs(silhouette, &pixels[f], visible, &matching)))
         })
         .collect()

@@ -168,6 +168,7 @@ mod tests {
             surface::sample_surface,
         },
         device::Backend,
+        loss::SilhouetteNorm,
         shape_prior,
     };
     use burn::module::Module;
@@ -223,6 +224,17 @@ mod tests {
     #[test]
     fn they_hold_it_when_exposures_are_solved_for() {
         check_normal_equations(ObjectiveConfig { solve_exposure: true, ..Default::default() });
+    }
+
+    #[test]
+    fn they_hold_it_when_silhouettes_are_robust() {
+        for silhouette_norm in [SilhouetteNorm::Unsquared, SilhouetteNorm::Saturating] {
+            check_normal_equations(ObjectiveConfig {
+                silhouette_norm,
+                silhouette_trim: 0.05,
+                ..Default::default()
+            });
+        }
     }
 
     #[test]

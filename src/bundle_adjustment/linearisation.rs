@@ -102,12 +102,14 @@ impl Linearisation<'_> {
         let stride = pairs.len().div_ceil(2 * self.max_residuals).max(1);
         let share = stride as f64 * f64::from(self.config.silhouette_weight)
             / self.matches.pairs.len() as f64;
+        let loss = self.config.silhouette_loss();
         for pair in pairs.iter().step_by(stride) {
             let at = self.matches.pixels[frame][pair.point_idx as usize];
             let offset = [0, 1].map(|axis| f64::from(at[axis] - pair.target[axis]));
             let distance = offset[0].hypot(offset[1]);
             let excess = distance - f64::from(pair.tolerance);
-            let weight = (share * f64::from(pair.weight)).sqrt();
+            let robust = loss.weight(excess * excess);
+            let weight = (share * f64::from(pair.weight) * robust).sqrt();
             let placed = rows.place(pair.point_idx as usize);
             let direction = offset.map(|offset| offset / distance.max(1e-9));
             let slope = self.by_camera_point(&placed.in_frame, direction);

@@ -13,7 +13,7 @@ use super::{
 use crate::{
     camera::Pose,
     host::index_tensor,
-    loss::{SilhouettePair, silhouette_distances},
+    loss::{SilhouetteLoss, SilhouetteNorm, SilhouettePair, silhouette_distances},
     pseudo_render::{Footprint, PseudoRenderConfig},
 };
 
@@ -58,6 +58,13 @@ pub struct ObjectiveConfig {
     pub tolerance_per_blur: f32,
     /// Measure to the silhouette's outline, to a fraction of a pixel, instead of to pixels' centres.
     pub silhouette_outline: bool,
+    /// What a distance beyond its tolerance costs.
+    pub silhouette_norm: SilhouetteNorm,
+    /// Distance in pixels around which a norm that is no square turns from one.
+    pub silhouette_scale: f32,
+    /// Share of each frame's pixels, of the samples of its outline and of its points whose distances,
+    /// the largest of each, are left out: masks may be wrong in parts.
+    pub silhouette_trim: f32,
     /// Let the reference frame's silhouette count, and average over L frames instead of L − 1.
     pub silhouette_of_reference: bool,
     /// Let hidden points count in the silhouette, too: they lie inside it as well, and close the
@@ -83,6 +90,9 @@ impl Default for ObjectiveConfig {
             containment_tolerance: 0.0,
             tolerance_per_blur: 0.3,
             silhouette_outline: true,
+            silhouette_norm: SilhouetteNorm::Squared,
+            silhouette_scale: 1.0,
+            silhouette_trim: 0.0,
             silhouette_of_reference: true,
             silhouette_of_hidden_points: true,
             style_weight: 1.0,
@@ -92,6 +102,10 @@ impl Default for ObjectiveConfig {
 }
 
 impl ObjectiveConfig {
+    pub(super) fn silhouette_loss(&self) -> SilhouetteLoss {
+        SilhouetteLoss { norm: self.silhouette_norm, scale: self.silhouette_scale }
+    }
+
     /// Eq. 6 as printed: sums of squares, λ = 0.01, Δp_l about the camera.
     pub fn paper() -> Self {
         Self {
@@ -107,6 +121,9 @@ impl ObjectiveConfig {
             containment_tolerance: 0.0,
             tolerance_per_blur: 0.0,
             silhouette_outline: false,
+            silhouette_norm: SilhouetteNorm::Squared,
+            silhouette_scale: 1.0,
+            silhouette_trim: 0.0,
             silhouette_of_reference: false,
             silhouette_of_hidden_points: false,
             style_weight: 0.0,
@@ -213,7 +230,7 @@ impl Objective<'_> {
             let pose = poses.clone().select(index_tensor(vec![*frame as i64], points));
             let point_idx = pairs.iter().map(|pair| i64::from(pair.point_idx)).collect();
             let pixels = self.pixels(points, point_idx, &pose); // [1, pairs, 2]
-            silhouette_distances(pixels.squeeze_dim(0), pairs)
+            silhouette_distances(pixels.squeeze_dim(0), pairs, self.config.silhouette_loss())
         };
         let paired = matches.pairs.iter().filter(|(_, pairs)| !pairs.is_empty());
         let sum = paired.map(of_frame).reduce(|sum, distances| sum + distances);

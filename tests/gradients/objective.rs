@@ -16,6 +16,7 @@ use object_pba::{
         ColorImage, ScalarImage,
         sequence::{Frame, Sequence},
     },
+    loss::SilhouetteNorm,
     pseudo_render::visible_points,
     shape_prior::ShapePriorConfig,
 };
@@ -30,6 +31,8 @@ const N_POINTS: usize = 64;
 fn configs() -> [ObjectiveConfig; 3] {
     let all = ObjectiveConfig {
         solve_exposure: true,
+        silhouette_norm: SilhouetteNorm::Unsquared,
+        silhouette_trim: 0.1,
         ..ObjectiveConfig::default()
     };
     [ObjectiveConfig::paper(), ObjectiveConfig::default(), all]

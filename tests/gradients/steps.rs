@@ -11,7 +11,10 @@ use object_pba::{
     chamfer::chamfer_distance,
     data::{ColorImage, ScalarImage},
     host::{host_pixels, index_tensor},
-    loss::{SilhouetteMatching, charbonnier, silhouette_distances, silhouette_pairs},
+    loss::{
+        SilhouetteLoss, SilhouetteMatching, SilhouetteNorm, charbonnier, silhouette_distances,
+        silhouette_pairs,
+    },
     sampling::ImageTable,
     shape_prior::ShapePriorConfig,
     silhouette::Silhouette,
@@ -103,15 +106,25 @@ fn silhouette_distances_to_points() {
     let silhouette = Silhouette::new(&disc).expect("a disc");
     let pixels: Vec<f64> = scattered(2 * 2 * 20, 4).iter().map(|x| 14.0 + 12.0 * x).collect();
     let everything: Vec<u32> = (0..40).collect();
-    for (to_outline, tolerances) in [(false, [0.0; 2]), (false, [0.9, 0.6]), (true, [0.3, 0.0])] {
-        let matching = SilhouetteMatching { to_outline, weights: [0.3, 0.7], tolerances };
+    let all = [SilhouetteNorm::Squared, SilhouetteNorm::Unsquared, SilhouetteNorm::Saturating];
+    let matchings = [
+        (false, [0.0; 2], 0.0),
+        (false, [0.9, 0.6], 0.0),
+        (true, [0.3, 0.0], 0.0),
+        (true, [0.3, 0.6], 0.2),
+    ];
+    for (norm, (to_outline, tolerances, trim)) in
+        all.into_iter().flat_map(|norm| matchings.map(|matching| (norm, matching)))
+    {
+        let loss = SilhouetteLoss { norm, scale: 0.8 };
+        let matching = SilhouetteMatching { to_outline, weights: [0.3, 0.7], tolerances, trim };
         let distances = |pixels: Tensor<1>| {
             let pixels = pixels.reshape([1, 40, 2]);
             let projected = &host_pixels(&pixels)[0];
             let pairs = silhouette_pairs(&silhouette, projected, &everything, &matching);
             let point_idx = pairs.iter().map(|pair| i64::from(pair.point_idx)).collect();
             let point_idx = index_tensor(point_idx, &pixels);
-            silhouette_distances(pixels.squeeze_dim::<2>(0).select(0, point_idx), &pairs)
+            silhouette_distances(pixels.squeeze_dim::<2>(0).select(0, point_idx), &pairs, loss)
         };
         check_gradient(&pixels, on_graph(distances));
     }

@@ -1,6 +1,7 @@
-//! Sequences as they come: exposures that vary. Shapes are known.
+//! Sequences as they come: exposures that vary, masks that are wrong or missing. Shapes are known.
 
 mod exposure;
+mod masks;
 
 use burn::tensor::{Tensor, TensorData};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
