@@ -36,6 +36,9 @@ pub struct Report {
     pub status: Status,
     pub hypotheses: Vec<HypothesisReport>,
     pub uncertainty: Option<UncertaintyReport>,
+    /// Focal lengths [f_x, f_y] in pixels, where they are refined.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focal: Option<[f32; 2]>,
     /// Each target frame's gain and bias, where they are solved for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub exposures: Option<Vec<Exposure>>,
@@ -155,6 +158,8 @@ pub fn reconstruct_and_score(
         solver: config.solver,
         status: outcome.status,
         hypotheses: outcome.hypotheses.clone(),
+        focal: (!outcome.unknowns.focal().is_empty())
+            .then(|| outcome.unknowns.intrinsics(&sequence.intrinsics).focal),
         exposures: outcome.exposures.clone(),
         uncertainty: outcome
             .uncertainty

@@ -167,3 +167,51 @@ pub fn silhouette_distances(
     let excess = squared - (distances * 2.0 - tolerances.clone()) * tolerances;
     (loss.of(excess) * weights).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::ScalarImage;
+    use image::Luma;
+
+    /// Two pixels of a mask, a point in each, and points at 1 to 8 px to the right of them.
+    #[test]
+    fn trimming_leaves_out_the_points_that_are_farthest_off() {
+        let mask = ScalarImage::from_fn(16, 4, |u, v| Luma([f32::from(u < 2 && v == 1)]));
+        let silhouette = Silhouette::new(&mask).expect("two pixels");
+        let projected: Vec<[f32; 2]> = (0..10).map(|i| [0.5 + i as f32, 1.5]).collect();
+        let points: Vec<u32> = (0..10).rev().collect();
+        let left = |trim: f32| -> Vec<u32> {
+            let matching = SilhouetteMatching {
+                to_outline: false,
+                weights: [1.0; 2],
+                tolerances: [0.1; 2],
+                trim,
+            };
+            let pairs = silhouette_pairs(&silhouette, &projected, &points, &matching);
+            pairs.iter().map(|pair| pair.point_idx).collect()
+        };
+        assert_eq!(left(0.0), [9, 8, 7, 6, 5, 4, 3, 2]);
+        // Shares are of all ten points, not of those that are off.
+        assert_eq!(left(0.3), [6, 5, 4, 3, 2]);
+        assert!(left(0.8).is_empty() && left(1.0).is_empty());
+    }
+
+    /// Both sides of iteratively reweighted least squares, by differences.
+    #[test]
+    fn a_weight_is_the_slope_of_its_loss() {
+        let device = crate::device::Backend::Flex.device();
+        for norm in [SilhouetteNorm::Squared, SilhouetteNorm::Unsquared, SilhouetteNorm::Saturating]
+        {
+            let loss = SilhouetteLoss { norm, scale: 1.5 };
+            let of = |squared: f32| {
+                loss.of(Tensor::<1>::from_floats([squared], &device)).into_scalar::<f32>()
+            };
+            for squared in [0.1, 1.0, 9.0] {
+                let slope = (of(squared + 0.05) - of(squared - 0.05)) / 0.1;
+                let weight = loss.weight(f64::from(squared)) as f32;
+                assert!((slope - weight).abs() < 5e-3, "{norm:?} at {squared}: {slope}, {weight}");
+            }
+        }
+    }
+}

@@ -144,6 +144,36 @@ fn estimated_cameras_are_a_sequence_of_the_same_convention() {
 }
 
 #[test]
+fn exposures_and_the_focal_length_are_reported_where_they_are_solved_for() {
+    let sequence = sample();
+    let config = sequence.path().join("options.toml");
+    let options = "[objective]\nsolve_exposure = true\nrefine_focal = true\n\
+        silhouette_norm = \"saturating\"\nsilhouette_trim = 0.01\n";
+    fs::write(&config, format!("blurs = [1.0]\n[lm]\niterations = 6\n{options}")).unwrap();
+    let out = TempDir::new().unwrap();
+    let [path, config, folder] =
+        [sequence.path(), &config, out.path()].map(|path| path.to_str().unwrap());
+    let output = pba_infer(&["run", path, "--out", folder, "--config", config]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |folder: &Path, name: &str| -> Value {
+        serde_json::from_str(&fs::read_to_string(folder.join(name)).unwrap()).unwrap()
+    };
+    let metrics = read(out.path(), "metrics.json");
+    let exposures = metrics["exposures"].as_array().unwrap();
+    assert_eq!(exposures.len(), 14);
+    for exposure in exposures {
+        // The sample's pictures are exposed alike.
+        assert!((exposure["gain"].as_f64().unwrap() - 1.0).abs() < 0.1, "{exposures:?}");
+    }
+    let (given, found) =
+        (read(sequence.path(), "transforms.json"), read(out.path(), "transforms.json"));
+    let [given, found, focal] =
+        [&given["fl_x"], &found["fl_x"], &metrics["focal"][0]].map(|focal| focal.as_f64().unwrap());
+    assert!(found != given && (found / given - 1.0).abs() < 0.2, "{found} from {given}");
+    assert!((found - focal).abs() < 1e-3 * focal, "{found} is not {focal}");
+}
+
+#[test]
 fn a_missing_frame_is_named() {
     let sequence = sample();
     fs::remove_file(sequence.path().join("images/frame_003.png")).unwrap();

@@ -43,14 +43,14 @@ impl Correspondences {
     pub fn new(
         observations: &Observations,
         frames: Vec<usize>,
-        (points_in_world, poses): (&Tensor<3>, &Pose),
+        (points_in_world, poses, intrinsics): (&Tensor<3>, &Pose, &Intrinsics),
         config: &ObjectiveConfig,
         level: usize,
     ) -> Self {
-        let Observations { intrinsics, size, .. } = observations;
+        let size = observations.size;
         let points = host_points(points_in_world);
         let cloud = points_in_world.clone();
-        let visible = visible_points(cloud, poses, intrinsics, *size, &config.pseudo_render);
+        let visible = visible_points(cloud, poses, intrinsics, size, &config.pseudo_render);
         let poses = poses.to_isometries();
         let (pixels, n_behind): (Vec<_>, Vec<_>) =
             poses.par_iter().map(|pose| projected(&points, pose, intrinsics)).unzip();

@@ -1,8 +1,8 @@
 //! The objective's residuals to first order, as the normal equations that Levenberg–Marquardt solves.
 //!
-//! The unknowns are small steps [δω_0, δt_0 | δs | δω_1, δt_1 | …]: rotations step on the left,
+//! The unknowns are small steps [δω_0, δt_0 | δs | δf | δω_1, δt_1 | …]: rotations step on the left,
 //! R_0 ← exp(δω_0) R_0 and ΔR_l ← exp(δω_l) ΔR_l, and Δp_l acts about the object. Frames meet only
-//! through p_0 and s, so each contributes one dense block and the matrix is an arrow.
+//! through p_0, s and f, the log of the focal length where that is refined, so each contributes one dense block and the matrix is an arrow.
 
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
@@ -16,12 +16,15 @@ use super::{
     rows::Rows,
     shape_jacobian::ShapeJacobian,
 };
-use crate::camera::NEAR;
+use crate::camera::{Intrinsics, NEAR};
 
 /// Where the objective is linearised.
 pub struct Linearisation<'a> {
     pub observations: &'a Observations,
     pub config: &'a ObjectiveConfig,
+    pub intrinsics: Intrinsics,
+    /// Whether the focal length is an unknown.
+    pub refines_focal: bool,
     /// Level of blur.
     pub level: usize,
     pub matches: &'a Correspondences,
@@ -37,7 +40,8 @@ impl Linearisation<'_> {
     pub fn normal_equations(&self) -> NormalEquations {
         let blocks: Vec<_> =
             (0..self.poses.len()).into_par_iter().map(|frame| self.rows(frame).squared()).collect();
-        NormalEquations::from_frames(6 + self.shape.n_directions(), &blocks)
+        let n_shared = 6 + self.shape.n_directions() + usize::from(self.refines_focal);
+        NormalEquations::from_frames(n_shared, &blocks)
     }
 
     fn rows(&self, frame: usize) -> Rows<'_> {
@@ -123,7 +127,7 @@ impl Linearisation<'_> {
 
     /// Of a derivative by the pixel, the one by the point in the camera: ∂π/∂x (Eq. 1), transposed.
     fn by_camera_point(&self, in_camera: &Vector3<f64>, by_pixel: [f64; 2]) -> Vector3<f64> {
-        let focal = self.observations.intrinsics.focal;
+        let focal = self.intrinsics.focal;
         let inverse_depth = in_camera.z.max(f64::from(NEAR)).recip();
         let [u, v] = [0, 1].map(|axis| by_pixel[axis] * f64::from(focal[axis]) * inverse_depth);
         Vector3::new(u, v, -(u * in_camera.x + v * in_camera.y) * inverse_depth)

@@ -181,7 +181,12 @@ pub fn bundle_adjust(
     };
     let mut progress =
         Progress { observe, stages: Vec::new(), iteration: 0, hypothesis: 0, blur: 0.0 };
-    let hypotheses = &hypotheses[..hypotheses.len().min(config.n_hypotheses.max(1))];
+    let mut hypotheses = hypotheses[..hypotheses.len().min(config.n_hypotheses.max(1))].to_vec();
+    if config.objective.refine_focal {
+        hypotheses
+            .iter_mut()
+            .for_each(|start| start.unknowns = start.unknowns.clone().with_focal());
+    }
     let initial = &hypotheses[0].unknowns;
     let mut runs: Vec<Run> = hypotheses.iter().map(|start| Run::new(start, initial)).collect();
     let last_level = config.blurs.len() - 1;

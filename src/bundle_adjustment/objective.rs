@@ -1,6 +1,6 @@
 //! L = L_ph + λ L_CD (Eq. 6), with what later work added to make it well behaved.
 
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, s};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -39,6 +39,9 @@ pub struct ObjectiveConfig {
     pub photometric_weight: f32,
     /// Charbonnier scale of a colour difference, RGB in [0, 1]; 0 takes plain squares.
     pub robust_scale: f32,
+    /// Find the focal length, too: one factor on those given. Perspective alone tells it from distance:
+    /// even a known shape holds it only to some per cent, unless it is near.
+    pub refine_focal: bool,
     /// Take each target frame to be exposed anew, and find the one gain and bias, shared by its channels,
     /// with which its colours agree best with the reference's.
     pub solve_exposure: bool,
@@ -82,6 +85,7 @@ impl Default for ObjectiveConfig {
             reduction: Reduction::Mean,
             photometric_weight: 1000.0,
             robust_scale: 0.05,
+            refine_focal: false,
             solve_exposure: false,
             within_masks: true,
             target_occlusion: true,
@@ -113,6 +117,7 @@ impl ObjectiveConfig {
             reduction: Reduction::Sum,
             photometric_weight: 1.0,
             robust_scale: 0.0,
+            refine_focal: false,
             solve_exposure: false,
             within_masks: false,
             target_occlusion: false,
@@ -142,6 +147,15 @@ pub struct Objective<'a> {
     pub config: &'a ObjectiveConfig,
     /// Where the graph lives; it differentiates.
     pub device: Device,
+}
+
+/// A cloud and the cameras that see it, on the graph.
+pub(super) struct Scene {
+    pub points: Tensor<3>, // [1, n, 3], in the world
+    /// One for each frame.
+    pub poses: Pose,
+    /// Log of the factor on the focal length, where it is an unknown: `[1, 1]`.
+    pub log_focal: Option<Tensor<2>>,
 }
 
 /// L_ph and L_CD on the graph, unweighted, and what they compare.
@@ -212,24 +226,23 @@ impl Objective<'_> {
         let frames: Vec<usize> = std::iter::once(0).chain(targets.iter().copied()).collect();
         let frame_idx = frames.iter().map(|&frame| frame as i64).collect();
         let poses = unknowns.poses(leaves).select(index_tensor(frame_idx, &points_in_world));
-        let cloud = (&points_in_world, &poses);
+        let intrinsics = unknowns.intrinsics(&self.observations.intrinsics);
+        let cloud = (&points_in_world, &poses, &intrinsics);
         let mut matches =
             Correspondences::new(self.observations, frames, cloud, self.config, level);
-        let (photometric, exposures) = self.photometric(&matches, cloud, level);
+        let scene = Scene { points: points_in_world, poses, log_focal: leaves.log_focal.clone() };
+        let (photometric, exposures) = self.photometric(&matches, &scene, level);
         matches.exposures = exposures;
-        Terms { photometric, silhouette: self.silhouette(&matches, cloud), matches }
+        Terms { photometric, silhouette: self.silhouette(&matches, &scene), matches }
     }
 
     /// L_CD (Eq. 5), over the frames that have a silhouette.
-    fn silhouette(
-        &self,
-        matches: &Correspondences,
-        (points, poses): (&Tensor<3>, &Pose),
-    ) -> Tensor<1> {
+    fn silhouette(&self, matches: &Correspondences, scene: &Scene) -> Tensor<1> {
+        let points = &scene.points;
         let of_frame = |(frame, pairs): &(usize, Vec<SilhouettePair>)| {
-            let pose = poses.clone().select(index_tensor(vec![*frame as i64], points));
+            let pose = scene.poses.clone().select(index_tensor(vec![*frame as i64], points));
             let point_idx = pairs.iter().map(|pair| i64::from(pair.point_idx)).collect();
-            let pixels = self.pixels(points, point_idx, &pose); // [1, pairs, 2]
+            let pixels = self.pixels(scene, point_idx, &pose); // [1, pairs, 2]
             silhouette_distances(pixels.squeeze_dim(0), pairs, self.config.silhouette_loss())
         };
         let paired = matches.pairs.iter().filter(|(_, pairs)| !pairs.is_empty());
@@ -239,14 +252,18 @@ impl Objective<'_> {
     }
 
     /// Where some points land in each view, `[views, points, 2]`.
-    pub(super) fn pixels(
-        &self,
-        points: &Tensor<3>,
-        point_idx: Vec<i64>,
-        poses: &Pose,
-    ) -> Tensor<3> {
-        let points = points.clone().select(1, index_tensor(point_idx, points));
-        self.observations.intrinsics.project(poses.camera_from_world(points)).pixels
+    pub(super) fn pixels(&self, scene: &Scene, point_idx: Vec<i64>, poses: &Pose) -> Tensor<3> {
+        let points = scene.points.clone().select(1, index_tensor(point_idx, &scene.points));
+        let mut in_camera = poses.camera_from_world(points);
+        if let Some(log_focal) = &scene.log_focal {
+            // To project with k f is to project [k x, k y, z] with f.
+            let factor = log_focal.clone().exp().unsqueeze_dim::<3>(0); // [1, 1, 1]
+            let [b, n, _] = in_camera.dims();
+            let depth = in_camera.clone().slice(s![.., .., 2..3]);
+            let sideways = in_camera.slice(s![.., .., 0..2]) * factor.expand([b, n, 2]);
+            in_camera = Tensor::cat(vec![sideways, depth], 2);
+        }
+        self.observations.intrinsics.project(in_camera).pixels
     }
 }
 

@@ -6,18 +6,19 @@ use rayon::prelude::*;
 use super::{
     correspondences::Correspondences,
     exposure::Exposure,
-    objective::{Objective, Reduction},
+    objective::{Objective, Reduction, Scene},
 };
-use crate::{camera::Pose, loss::charbonnier};
+use crate::loss::charbonnier;
 
 impl Objective<'_> {
     /// L_ph (Eq. 3), over the points that the reference frame sees, and each target's exposure.
     pub(super) fn photometric(
         &self,
         matches: &Correspondences,
-        (points, poses): (&Tensor<3>, &Pose),
+        scene: &Scene,
         level: usize,
     ) -> (Tensor<1>, Vec<Exposure>) {
+        let points = &scene.points;
         let [_, n, _] = points.dims();
         let (n_targets, seen) = (matches.frames.len() - 1, &matches.visible[0]);
         let mut exposures = vec![Exposure::NEUTRAL; n_targets];
@@ -33,7 +34,8 @@ impl Objective<'_> {
             };
             return (Tensor::from_floats([worst], &points.device()), exposures);
         }
-        let pixels = self.pixels(points, seen.iter().map(|&i| i64::from(i)).collect(), poses);
+        let point_idx = seen.iter().map(|&i| i64::from(i)).collect();
+        let pixels = self.pixels(scene, point_idx, &scene.poses);
         let images = &self.observations.images[level];
         let colors = images.sample_bilinear(&matches.frames, pixels);
         let (reference, mut targets) = (colors.clone().slice(s![0..1]), colors.slice(s![1..]));

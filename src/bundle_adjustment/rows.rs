@@ -4,12 +4,14 @@ use nalgebra::{DMatrix, DVector, Isometry3, Matrix3, Vector3};
 
 use super::{linearisation::Linearisation, shape_jacobian::ShapeJacobian};
 
-/// Rows of one frame's weighted Jacobian and their residuals; columns are [p_0 | s | Δp_l].
+/// Rows of one frame's weighted Jacobian and their residuals; columns are
+/// [p_0 | s | focal | Δp_l], of which the focal length may not be there.
 pub struct Rows<'a> {
     jacobian: Vec<f64>,
     residuals: Vec<f64>,
     points: &'a [[f32; 3]],
     shape: &'a ShapeJacobian,
+    refines_focal: bool,
     poses: [&'a Isometry3<f64>; 2],
     /// R_0, R_l and ΔR_l = R_l R_0ᵀ.
     rotations: [Matrix3<f64>; 2],
@@ -34,6 +36,7 @@ impl<'a> Rows<'a> {
             residuals: Vec::new(),
             points: &at.matches.points,
             shape: at.shape,
+            refines_focal: at.refines_focal,
             poses,
             rotations,
             relative: rotations[1] * rotations[0].transpose(),
@@ -62,6 +65,11 @@ impl<'a> Rows<'a> {
                 .iter()
                 .map(|moved| (0..3).map(|i| by_world[i] * f64::from(moved[i])).sum::<f64>()),
         );
+        if self.refines_focal {
+            // A longer one moves pixels as [x, y] do: ∂u/∂(log f) = f x / z.
+            let sideways = |by_point: &Vector3<f64>, at: &Vector3<f64>| by_point.xy().dot(&at.xy());
+            rows.push(sideways(&a, &placed.in_reference) + sideways(&b, &placed.in_frame));
+        }
         rows.extend(placed.turned[1].cross(&b).as_slice());
         rows.extend(b.as_slice());
         self.residuals.push(weight * residual);
@@ -71,7 +79,7 @@ impl<'a> Rows<'a> {
     /// J, weighted as its rows are, for each. What these rows can say of the others is what remains when
     /// they are projected off those columns, which is the Schur complement of JᵀJ.
     pub fn eliminate(&mut self, columns: &[Vec<f64>]) {
-        let n_columns = 12 + self.shape.n_directions();
+        let n_columns = self.n_columns();
         let mut basis: Vec<DVector<f64>> = Vec::new();
         for column in columns {
             let mut rest = DVector::from_column_slice(column);
@@ -96,11 +104,15 @@ impl<'a> Rows<'a> {
         }
     }
 
+    fn n_columns(&self) -> usize {
+        12 + self.shape.n_directions() + usize::from(self.refines_focal)
+    }
+
     /// JᵀJ and Jᵀr.
     pub fn squared(self) -> (DMatrix<f64>, DVector<f64>) {
+        let n_columns = self.n_columns();
         let residuals = DVector::from_vec(self.residuals);
         // Rows of J one after the other are the columns of Jᵀ.
-        let n_columns = 12 + self.shape.n_directions();
         let transposed = DMatrix::from_vec(n_columns, residuals.len(), self.jacobian);
         (&transposed * transposed.transpose(), transposed * residuals)
     }
@@ -129,6 +141,7 @@ mod tests {
             residuals: residuals.clone(),
             points: &[],
             shape: &shape,
+            refines_focal: false,
             poses: [&pose, &pose],
             rotations: [Matrix3::identity(); 2],
             relative: Matrix3::identity(),

@@ -30,6 +30,7 @@ const N_POINTS: usize = 64;
 /// Ours, ours with everything that may be switched on, and the paper's.
 fn configs() -> [ObjectiveConfig; 3] {
     let all = ObjectiveConfig {
+        refine_focal: true,
         solve_exposure: true,
         silhouette_norm: SilhouetteNorm::Unsquared,
         silhouette_trim: 0.1,
@@ -79,6 +80,11 @@ fn unknowns(style: &[f64], distance: f32, config: &ObjectiveConfig) -> Unknowns 
         .map(|turn| Isometry3::new(Vector3::new(0.01, -0.02, distance), turn * Vector3::y()))
         .to_vec();
     let mut unknowns = Unknowns::with_poses(&poses, &[], config.parameterisation);
+    if config.refine_focal {
+        unknowns = unknowns.with_focal();
+        let focal = unknowns.focal();
+        unknowns.values[focal].fill(0.04);
+    }
     unknowns.values.extend(style);
     unknowns
 }
@@ -155,7 +161,8 @@ fn points_that_no_frame_sees_have_no_gradient() {
 fn seen_by_any_frame(unknowns: &Unknowns, config: &ObjectiveConfig) -> Vec<bool> {
     let leaves = unknowns.leaves(&DEVICE);
     let points = leaves.style.clone().reshape([1, N_POINTS as i32, 3]);
-    let (poses, intrinsics) = (unknowns.poses(&leaves), sequence().intrinsics);
+    let (poses, intrinsics) =
+        (unknowns.poses(&leaves), unknowns.intrinsics(&sequence().intrinsics));
     let visible = visible_points(points.inner(), &poses, &intrinsics, SIZE, &config.pseudo_render);
     let mut seen = vec![false; N_POINTS];
     visible.concat().iter().for_each(|&point_idx| seen[point_idx as usize] = true);

@@ -57,7 +57,12 @@ fn check_pixels(parameterisation: Parameterisation) {
         let pixels = |twists: Tensor<1>| {
             let twist = |start: usize| twists.clone().slice(s![start..start + 6]).reshape([1, 6]);
             let style = Tensor::zeros([1, 1], &*DEVICE);
-            let leaves = Leaves { reference_twist: twist(0), relative_twists: twist(6), style };
+            let leaves = Leaves {
+                reference_twist: twist(0),
+                relative_twists: twist(6),
+                log_focal: None,
+                style,
+            };
             let points_in_camera = unknowns.poses(&leaves).camera_from_world(points.clone());
             mixed(CAMERA.project(points_in_camera).pixels)
         };

@@ -1,6 +1,8 @@
-//! Sequences as they come: exposures that vary, masks that are wrong or missing. Shapes are known.
+//! Sequences as they come: exposures that vary, masks that are wrong or missing, a focal
+//! length that is only about right. Shapes are known.
 
 mod exposure;
+mod focal;
 mod masks;
 
 use burn::tensor::{Tensor, TensorData};
@@ -36,11 +38,8 @@ fn adjusted(sequence: &Sequence, seed: u64, objective: ObjectiveConfig) -> Outco
     let values: Vec<f32> = points.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
     let values = TensorData::new(values, [1, points.len(), 3]);
     let shape = KnownPoints(Tensor::from_data(values, &device));
-    let config = BundleAdjustmentConfig {
-        objective,
-        lm: LevenbergMarquardtConfig { max_residuals: 2000, ..Default::default() },
-        ..Default::default()
-    };
+    let lm = LevenbergMarquardtConfig { max_residuals: 2000, ..Default::default() };
+    let config = BundleAdjustmentConfig { objective, lm, ..Default::default() };
     let mut rng = keyed_rng(seed, [7, 0]);
     let mut perturb = |pose: &Isometry3<f32>| {
         let axis = Vector3::from_fn(|_, _| rng.random_range(-1.0f32..1.0)).normalize();
