@@ -77,7 +77,8 @@ impl<'a> Rows<'a> {
 
     /// Eliminates unknowns that only the rows so far depend on, and that are at their best: a column of
     /// J, weighted as its rows are, for each. What these rows can say of the others is what remains when
-    /// they are projected off those columns, which is the Schur complement of JᵀJ.
+    /// they are projected off those columns, which is the Schur complement of JᵀJ. Of the residuals, Jᵀr
+    /// then ignores what lies along those columns.
     pub fn eliminate(&mut self, columns: &[Vec<f64>]) {
         let n_columns = self.n_columns();
         let mut basis: Vec<DVector<f64>> = Vec::new();
@@ -98,9 +99,6 @@ impl<'a> Rows<'a> {
             for (row, share) in self.jacobian.chunks_mut(n_columns).zip(unit.iter()) {
                 row.iter_mut().zip(&along).for_each(|(value, sum)| *value -= share * sum);
             }
-            let along: f64 =
-                self.residuals.iter().zip(unit.iter()).map(|(r, share)| r * share).sum();
-            self.residuals.iter_mut().zip(unit.iter()).for_each(|(r, share)| *r -= share * along);
         }
     }
 
