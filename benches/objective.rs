@@ -233,8 +233,12 @@ mod parts {
             frames.iter().map(|frame| Silhouette::new(&frame.mask).expect("a car")).collect();
         let pixels = host_pixels(&problem.pixels());
         let everything: Vec<u32> = (0..pixels[0].len() as u32).collect();
-        let matching =
-            SilhouetteMatching { to_outline: true, weights: [1.0; 2], tolerances: [0.3, 0.0] };
+        let matching = SilhouetteMatching {
+            to_outline: true,
+            weights: [1.0; 2],
+            tolerances: [0.3, 0.0],
+            trim: 0.0,
+        };
         bencher.bench(|| {
             let pairs = silhouettes.par_iter().zip(&pixels).map(|(silhouette, pixels)| {
                 silhouette_pairs(silhouette, pixels, &everything, &matching).len()

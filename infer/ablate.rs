@@ -18,7 +18,7 @@ use object_pba::{
     reconstruction::{Scores, points, score, views},
 };
 
-use crate::{Options, figures, input::Input, output};
+use crate::{Options, figures, input::Input, output, run::NO_REFERENCE_MASK};
 
 /// Step size or scale of a free point in world units, a tenth of the spacing of 6,144 points on a car.
 const POINT_RATE: f64 = 2e-3;
@@ -77,7 +77,7 @@ fn compare(
 ) -> Result<[Arm; 3]> {
     let with_prior = InitialGuess::hypotheses(prior, sequence, config);
     if with_prior.is_empty() {
-        bail!("{}: the reference frame's mask is empty", sequence.name);
+        bail!("{}: {NO_REFERENCE_MASK}", sequence.name);
     }
     let generator = &prior.shape.generator;
     let cloud = points(generator, &with_prior[0].unknowns, device);

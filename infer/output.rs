@@ -51,7 +51,7 @@ pub fn write(
     let unknowns = &reconstruction.outcome.unknowns;
     let poses = unknowns.camera_from_world(&device);
     let trajectory = Trajectory {
-        intrinsics: sequence.intrinsics,
+        intrinsics: unknowns.intrinsics(&sequence.intrinsics),
         size: sequence.size,
         camera_from_world: poses.clone(),
         pictures: sequence.frames.iter().map(|frame| frame.path.clone()).collect(),

@@ -7,8 +7,8 @@ use burn::tensor::Device;
 use indicatif::{ProgressBar, ProgressStyle};
 use object_pba::{
     bundle_adjustment::{
-        BundleAdjustmentConfig, HypothesisReport, Outcome, Solver, Status, Step, Uncertainty,
-        WithinTwoSigma, unknowns::Unknowns,
+        BundleAdjustmentConfig, Exposure, HypothesisReport, Outcome, Solver, Status, Step,
+        Uncertainty, WithinTwoSigma, unknowns::Unknowns,
     },
     checkpoint::Prior,
     data::sequence::Sequence,
@@ -36,6 +36,12 @@ pub struct Report {
     pub status: Status,
     pub hypotheses: Vec<HypothesisReport>,
     pub uncertainty: Option<UncertaintyReport>,
+    /// Focal lengths [f_x, f_y] in pixels, where they are refined.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focal: Option<[f32; 2]>,
+    /// Each target frame's gain and bias, where they are solved for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposures: Option<Vec<Exposure>>,
 }
 
 /// Standard deviations: roots of expected squared errors. `null` where the solver knows none.
@@ -68,6 +74,10 @@ impl UncertaintyReport {
         }
     }
 }
+
+/// Why there is nothing to start from, and what helps. Other frames may do without masks.
+pub const NO_REFERENCE_MASK: &str = "the first frame, to which all others refer, has no mask or an empty one; \
+    give it one (mask_path, masks/, --masks or an alpha channel), or begin with a frame that has one (--frames)";
 
 /// A finished reconstruction, with all that figures are made from.
 pub struct Reconstruction {
@@ -129,7 +139,7 @@ pub fn reconstruct_and_score(
         observe(step, unknowns);
     });
     let missing = match config.start {
-        Start::Regressors => "the reference frame's mask is empty",
+        Start::Regressors => NO_REFERENCE_MASK,
         Start::Truth => "its true poses and points, to start from, are not known",
     };
     let outcome = outcome.with_context(|| format!("{}: {missing}", sequence.name))?;
@@ -148,6 +158,9 @@ pub fn reconstruct_and_score(
         solver: config.solver,
         status: outcome.status,
         hypotheses: outcome.hypotheses.clone(),
+        focal: (!outcome.unknowns.focal().is_empty())
+            .then(|| outcome.unknowns.intrinsics(&sequence.intrinsics).focal),
+        exposures: outcome.exposures.clone(),
         uncertainty: outcome
             .uncertainty
             .as_ref()

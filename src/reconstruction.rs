@@ -114,11 +114,11 @@ pub fn views(
 ) -> Views {
     let device = device.clone().inner();
     let poses = unknowns.poses(&unknowns.leaves(&device));
-    let Sequence { intrinsics, size, .. } = sequence;
+    let (intrinsics, size) = (unknowns.intrinsics(&sequence.intrinsics), sequence.size);
     let points = points(shape, unknowns, &device);
     let projection = intrinsics.project(poses.camera_from_world(points.clone()));
     Views {
         pixels: host_pixels(&projection.pixels),
-        visible: visible_points(points, &poses, intrinsics, *size, pseudo_render),
+        visible: visible_points(points, &poses, &intrinsics, size, pseudo_render),
     }
 }

@@ -189,6 +189,36 @@ fn the_ablation_says_when_it_does_not_use_lm() {
 }
 
 #[test]
+fn exposures_and_the_focal_length_are_reported_where_they_are_solved_for() {
+    let sequence = sample();
+    let config = sequence.path().join("options.toml");
+    let options = "[objective]\nsolve_exposure = true\nrefine_focal = true\n\
+        silhouette_norm = \"saturating\"\nsilhouette_trim = 0.01\n";
+    fs::write(&config, format!("blurs = [1.0]\n[lm]\niterations = 6\n{options}")).unwrap();
+    let out = TempDir::new().unwrap();
+    let [path, config, folder] =
+        [sequence.path(), &config, out.path()].map(|path| path.to_str().unwrap());
+    let output = pba_infer(&["run", path, "--out", folder, "--config", config]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |folder: &Path, name: &str| -> Value {
+        serde_json::from_str(&fs::read_to_string(folder.join(name)).unwrap()).unwrap()
+    };
+    let metrics = read(out.path(), "metrics.json");
+    let exposures = metrics["exposures"].as_array().unwrap();
+    assert_eq!(exposures.len(), 14);
+    for exposure in exposures {
+        // The sample's pictures are exposed alike.
+        assert!((exposure["gain"].as_f64().unwrap() - 1.0).abs() < 0.1, "{exposures:?}");
+    }
+    let (given, found) =
+        (read(sequence.path(), "transforms.json"), read(out.path(), "transforms.json"));
+    let [given, found, focal] =
+        [&given["fl_x"], &found["fl_x"], &metrics["focal"][0]].map(|focal| focal.as_f64().unwrap());
+    assert!(found != given && (found / given - 1.0).abs() < 0.2, "{found} from {given}");
+    assert!((found - focal).abs() < 1e-3 * focal, "{found} is not {focal}");
+}
+
+#[test]
 fn a_missing_frame_is_named() {
     let sequence = sample();
     fs::remove_file(sequence.path().join("images/frame_003.png")).unwrap();
@@ -202,6 +232,35 @@ fn a_frame_of_another_size_is_named() {
     let mask = image::GrayImage::from_pixel(64, 32, image::Luma([255]));
     mask.save(sequence.path().join("masks/frame_002.png")).unwrap();
     check_refused(&run(sequence.path(), &[]), &["frame_002.png", "64"]);
+}
+
+#[test]
+fn frames_may_lack_masks_and_the_reference_may_not() {
+    let sequence = sample();
+    let quick = sequence.path().join("quick.toml");
+    fs::write(&quick, "blurs = [1.0]\n[lm]\niterations = 2\n").unwrap();
+    let arguments = ["--config", quick.to_str().unwrap()];
+    let mask = |frame: usize| sequence.path().join(format!("masks/frame_{frame:03}.png"));
+    fs::remove_file(mask(3)).unwrap();
+    image::GrayImage::new(128, 128).save(mask(7)).unwrap();
+    let out = TempDir::new().unwrap();
+    let [path, folder] = [&sequence, &out].map(|folder| folder.path().to_str().unwrap());
+    let output = pba_infer(&[&["run", path, "--out", folder], &arguments[..]].concat());
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    let note = "2 of 15 frames have no mask, or an empty one; the first is images/frame_003.png";
+    assert!(message.contains(note), "{message}");
+    let metrics = fs::read_to_string(out.path().join("metrics.json")).unwrap();
+    let metrics: Value = serde_json::from_str(&metrics).unwrap();
+    let error = |state: &str| metrics[state]["rotation_error_deg_mean"].as_f64().unwrap();
+    assert!(error("final") < error("initial"), "{metrics}");
+
+    (0..15).for_each(|frame| drop(fs::remove_file(mask(frame))));
+    let missing = ["first frame", "no mask", "--masks", "--frames"];
+    check_refused(&run(sequence.path(), &arguments), &missing);
+    let from_truth = [&arguments[..], &["--start", "truth"]].concat();
+    let output = run(sequence.path(), &from_truth);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]

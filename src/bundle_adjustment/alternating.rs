@@ -54,6 +54,9 @@ pub fn run(
         update_relative_poses(objective, unknowns, level, &config.lbfgs);
         progress.report("relative poses", &objective.evaluate(unknowns, level), unknowns);
         update_block(objective, unknowns, Unknowns::REFERENCE, level, &config.lbfgs);
+        if !unknowns.focal().is_empty() {
+            update_block(objective, unknowns, unknowns.focal(), level, &config.lbfgs);
+        }
         progress.report("reference pose", &objective.evaluate(unknowns, level), unknowns);
         update_block(objective, unknowns, unknowns.style(), level, &config.lbfgs);
         let current = objective.evaluate(unknowns, level);

@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Vector2, Vector3};
 use rayon::prelude::*;
 
 use super::{
+    exposure::Exposure,
     objective::{ObjectiveConfig, Reduction},
     observations::Observations,
 };
@@ -33,6 +34,8 @@ pub struct Correspondences {
     pub comparable: Vec<Vec<f32>>,
     /// The silhouette's pairs, each list with its place in `frames`.
     pub pairs: Vec<(usize, Vec<SilhouettePair>)>,
+    /// How each target is exposed.
+    pub exposures: Vec<Exposure>,
 }
 
 impl Correspondences {
@@ -40,14 +43,14 @@ impl Correspondences {
     pub fn new(
         observations: &Observations,
         frames: Vec<usize>,
-        (points_in_world, poses): (&Tensor<3>, &Pose),
+        (points_in_world, poses, intrinsics): (&Tensor<3>, &Pose, &Intrinsics),
         config: &ObjectiveConfig,
         level: usize,
     ) -> Self {
-        let Observations { intrinsics, size, .. } = observations;
+        let size = observations.size;
         let points = host_points(points_in_world);
         let cloud = points_in_world.clone();
-        let visible = visible_points(cloud, poses, intrinsics, *size, &config.pseudo_render);
+        let visible = visible_points(cloud, poses, intrinsics, size, &config.pseudo_render);
         let poses = poses.to_isometries();
         let (pixels, n_behind): (Vec<_>, Vec<_>) =
             poses.par_iter().map(|pose| projected(&points, pose, intrinsics)).unzip();
@@ -63,7 +66,9 @@ impl Correspondences {
             })
             .collect();
         let pairs = pairs(observations, &frames, &pixels, &visible, config, level);
-        Self { frames, points, pixels, n_in_frame, n_behind, visible, comparable, pairs }
+        // Colours tell, which are the graph's.
+        let exposures = vec![Exposure::NEUTRAL; frames.len() - 1];
+        Self { frames, points, pixels, n_in_frame, n_behind, visible, comparable, pairs, exposures }
     }
 
     /// Whether every point lands somewhere.
@@ -145,7 +150,8 @@ fn pairs(
                 Reduction::Mean => [silhouette.pixels.len(), visible.len()].map(|n| 1.0 / n as f32),
             };
             let to_outline = config.silhouette_outline;
-            let matching = SilhouetteMatching { to_outline, weights, tolerances };
+            let trim = config.silhouette_trim;
+            let matching = SilhouetteMatching { to_outline, weights, tolerances, trim };
             Some((f, silhouette_pairs(silhouette, &pixels[f], visible, &matching)))
         })
         .collect()

@@ -50,6 +50,8 @@ const DAMPING_FACTORS: [f64; 2] = [6.0, 0.3];
 /// Longest step of a rotation (radians), and of a style direction (standard deviations).
 const MAX_TURN: f64 = 0.2;
 const MAX_STYLE_STEP: f64 = 0.7;
+/// Longest step of the log of the focal length.
+const MAX_FOCAL_STEP: f64 = 0.1;
 
 /// Runs at one level of blur. A step that does not lower the objective, or leads into a fault, is never
 /// taken.
@@ -79,7 +81,7 @@ pub fn run(
         };
         let mut refused = None;
         let better = |damping| {
-            let step = limited(step(damping)?, n_directions);
+            let step = limited(step(damping)?, n_directions, unknowns.focal().len());
             let next = unknowns.stepped(step.as_slice(), n_directions);
             let (value, matches) = objective.value(&next, level);
             if value.objective >= current.objective || value.objective.is_nan() {
@@ -117,16 +119,18 @@ fn damped_step<T>(mut better: impl FnMut(f64) -> Option<T>, damping: &mut f64) -
 }
 
 /// Shortens a step whose linear model can no longer be trusted.
-fn limited(step: DVector<f64>, n_directions: usize) -> DVector<f64> {
+fn limited(step: DVector<f64>, n_directions: usize, n_focal: usize) -> DVector<f64> {
     let style = 6..6 + n_directions;
+    let focal = style.end..style.end + n_focal;
     let excess = step.iter().enumerate().map(|(i, value)| {
-        let of_translation =
-            !style.contains(&i) && (i - if i < 6 { 0 } else { n_directions }) % 6 >= 3;
-        match (style.contains(&i), of_translation) {
-            (true, _) => value.abs() / MAX_STYLE_STEP,
-            (_, true) => 0.0,
-            _ => value.abs() / MAX_TURN,
+        if style.contains(&i) {
+            return value.abs() / MAX_STYLE_STEP;
         }
+        if focal.contains(&i) {
+            return value.abs() / MAX_FOCAL_STEP;
+        }
+        let of_translation = (i - if i < 6 { 0 } else { focal.end }) % 6 >= 3;
+        if of_translation { 0.0 } else { value.abs() / MAX_TURN }
     });
     let excess = excess.fold(1.0, f64::max);
     step / excess
@@ -144,6 +148,8 @@ pub(super) fn normal_equations(
     let linearisation = Linearisation {
         observations: objective.observations,
         config: objective.config,
+        intrinsics: unknowns.intrinsics(&objective.observations.intrinsics),
+        refines_focal: !unknowns.focal().is_empty(),
         level,
         matches,
         poses: &unknowns.host_poses(&objective.device),
@@ -151,7 +157,8 @@ pub(super) fn normal_equations(
         max_residuals: config.max_residuals,
     };
     let mut model = linearisation.normal_equations();
-    model.add_style_prior(objective.config.style_weight, &unknowns.values[unknowns.style()]);
+    let style = &unknowns.values[unknowns.style()];
+    model.add_style_prior(objective.config.style_weight, style, shape.n_directions());
     model
 }
 
@@ -168,13 +175,14 @@ mod tests {
             surface::sample_surface,
         },
         device::Backend,
+        loss::SilhouetteNorm,
         shape_prior,
     };
     use burn::module::Module;
 
     /// Both see the same residuals; squares have twice the gradient that the equations hold.
-    #[test]
-    fn the_normal_equations_hold_the_gradient_of_the_graph() {
+    #[track_caller]
+    fn check_normal_equations(config: ObjectiveConfig) {
         let device = Backend::Flex.device().autodiff();
         device.seed(3);
         let mesh = procedural::car(5);
@@ -186,7 +194,6 @@ mod tests {
         let generator = tiny.init(&template, &device).generator.no_grad();
 
         let observations = Observations::new(&sequence, &[1.0], &device);
-        let config = ObjectiveConfig::default();
         let objective = Objective {
             observations: &observations,
             shape: &generator,
@@ -195,9 +202,15 @@ mod tests {
         };
         let start = sequence.truth.expect("rendered").camera_from_world[0];
         let style = [0.3, -0.2, 0.5, 0.1, 0.0, -0.4];
-        let unknowns = Unknowns::new(start, 3, &style, Parameterisation::ObjectCentred);
+        let mut unknowns = Unknowns::new(start, 3, &style, Parameterisation::ObjectCentred);
+        if config.refine_focal {
+            unknowns = unknowns.with_focal();
+            let focal = unknowns.focal();
+            unknowns.values[focal].fill(0.03);
+        }
         let mut shape = ShapeJacobian::default();
         shape.refresh(&objective, &unknowns, style.len());
+        let focal = unknowns.focal();
         let config =
             LevenbergMarquardtConfig { max_residuals: usize::MAX / 4, ..Default::default() };
         let (_, matches) = objective.value(&unknowns, 0);
@@ -205,20 +218,50 @@ mod tests {
         let gradient = model.gradient();
 
         let of_graph = objective.evaluate(&unknowns, 0).gradient;
-        // [p_0 | Δp_1, Δp_2 | s] there, [p_0 | s | Δp_1, Δp_2] here.
-        let in_order = [&of_graph[..6], &of_graph[18..], &of_graph[6..18]].concat();
+        // [p_0 | Δp_1, Δp_2 | focal | s] there, [p_0 | s | focal | Δp_1, Δp_2] here.
+        let (style, focal) = (&of_graph[focal.end..], &of_graph[focal]);
+        let in_order = [&of_graph[..6], style, focal, &of_graph[6..18]].concat();
         let scale = in_order.iter().fold(0.0, |max: f64, g| max.max(g.abs()));
         for (i, (expected, found)) in in_order.iter().zip(gradient.iter()).enumerate() {
             // The style's derivatives are differences over a step that rounding can stand.
-            let tolerance = if (6..12).contains(&i) { 1e-2 } else { 1e-4 };
+            let tolerance = if (6..12).contains(&i) { 2e-2 } else { 1e-4 };
             let error = (expected - 2.0 * found).abs();
             assert!(error < tolerance * scale, "{in_order:?} is not twice {gradient}");
         }
     }
 
     #[test]
+    fn the_normal_equations_hold_the_gradient_of_the_graph() {
+        check_normal_equations(ObjectiveConfig::default());
+    }
+
+    #[test]
+    fn they_hold_it_when_exposures_are_solved_for() {
+        check_normal_equations(ObjectiveConfig { solve_exposure: true, ..Default::default() });
+    }
+
+    #[test]
+    fn they_hold_it_when_the_focal_length_is_refined() {
+        check_normal_equations(ObjectiveConfig { refine_focal: true, ..Default::default() });
+    }
+
+    #[test]
+    fn they_hold_it_when_silhouettes_are_robust() {
+        for silhouette_norm in [SilhouetteNorm::Unsquared, SilhouetteNorm::Saturating] {
+            check_normal_equations(ObjectiveConfig {
+                silhouette_norm,
+                silhouette_trim: 0.05,
+                ..Default::default()
+            });
+        }
+    }
+
+    #[test]
     fn a_long_step_is_shortened_as_a_whole() {
-        let step = limited(DVector::from_vec(vec![0.4, 0.0, 0.1, 5.0, 0.0, 0.0, 0.7]), 1);
+        let step = limited(DVector::from_vec(vec![0.4, 0.0, 0.1, 5.0, 0.0, 0.0, 0.7]), 1, 0);
         assert_eq!(step.as_slice(), [0.2, 0.0, 0.05, 2.5, 0.0, 0.0, 0.35]);
+        let step = vec![0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2, 0.4, 0.0, 0.0, 9.0, 0.0, 0.0];
+        let halved: Vec<f64> = step.iter().map(|value| 0.5 * value).collect();
+        assert_eq!(limited(DVector::from_vec(step), 0, 1).as_slice(), halved);
     }
 }

@@ -1,8 +1,8 @@
 //! The objective's residuals to first order, as the normal equations that Levenberg–Marquardt solves.
 //!
-//! The unknowns are small steps [δω_0, δt_0 | δs | δω_1, δt_1 | …]: rotations step on the left,
+//! The unknowns are small steps [δω_0, δt_0 | δs | δf | δω_1, δt_1 | …]: rotations step on the left,
 //! R_0 ← exp(δω_0) R_0 and ΔR_l ← exp(δω_l) ΔR_l, and Δp_l acts about the object. Frames meet only
-//! through p_0 and s, so each contributes one dense block and the matrix is an arrow.
+//! through p_0, s and f, the log of the focal length where that is refined, so each contributes one dense block and the matrix is an arrow.
 
 use nalgebra::{Isometry3, Vector3};
 use rayon::prelude::*;
@@ -16,12 +16,15 @@ use super::{
     rows::Rows,
     shape_jacobian::ShapeJacobian,
 };
-use crate::camera::NEAR;
+use crate::camera::{Intrinsics, NEAR};
 
 /// Where the objective is linearised.
 pub struct Linearisation<'a> {
     pub observations: &'a Observations,
     pub config: &'a ObjectiveConfig,
+    pub intrinsics: Intrinsics,
+    /// Whether the focal length is an unknown.
+    pub refines_focal: bool,
     /// Level of blur.
     pub level: usize,
     pub matches: &'a Correspondences,
@@ -37,7 +40,8 @@ impl Linearisation<'_> {
     pub fn normal_equations(&self) -> NormalEquations {
         let blocks: Vec<_> =
             (0..self.poses.len()).into_par_iter().map(|frame| self.rows(frame).squared()).collect();
-        NormalEquations::from_frames(6 + self.shape.n_directions(), &blocks)
+        let n_shared = 6 + self.shape.n_directions() + usize::from(self.refines_focal);
+        NormalEquations::from_frames(n_shared, &blocks)
     }
 
     fn rows(&self, frame: usize) -> Rows<'_> {
@@ -49,7 +53,8 @@ impl Linearisation<'_> {
         rows
     }
 
-    /// I_0(u_0) − I_l(u_l) of every point that may be compared, reweighted by Charbonnier's loss.
+    /// I_0(u_0) − I_l(u_l), exposed alike, of every point that may be compared, reweighted by
+    /// Charbonnier's loss.
     fn photometric_rows(&self, frame: usize, rows: &mut Rows) {
         let comparable = &self.matches.comparable[frame - 1];
         let seen = &self.matches.visible[0];
@@ -61,12 +66,14 @@ impl Linearisation<'_> {
         };
         let share = stride as f64 * f64::from(self.config.photometric_weight) / count;
         let images = &self.observations.host_images[self.level];
+        let exposure = self.matches.exposures[frame - 1];
+        let mut by_exposure = Vec::new();
         for &j in used.iter().step_by(stride) {
             let point = seen[j] as usize;
             let [at, there] = [0, frame].map(|f| self.matches.pixels[f][point]);
             let (color, slope) = color_and_slope(&images[0], at);
             let (target, target_slope) = color_and_slope(&images[frame], there);
-            let residual: [f64; 3] = std::array::from_fn(|c| color[c] - target[c]);
+            let residual = exposure.residual(&[color, target]);
             let squared: f64 = residual.iter().map(|r| r * r).sum();
             let robust = match f64::from(self.config.robust_scale) {
                 scale if scale > 0.0 => (1.0 + squared / (scale * scale)).sqrt().recip(),
@@ -77,7 +84,18 @@ impl Linearisation<'_> {
             for c in 0..3 {
                 let in_reference = self.by_camera_point(&placed.in_reference, slope[c]);
                 let in_frame = self.by_camera_point(&placed.in_frame, target_slope[c]);
-                rows.push(&placed, [in_reference, -in_frame], residual[c], weight);
+                let by_points = [in_reference, -in_frame * exposure.gain];
+                rows.push(&placed, by_points, residual[c], weight);
+                by_exposure.push([-target[c] * weight, -weight]);
+            }
+        }
+        if self.config.solve_exposure {
+            let by_gain = by_exposure.iter().map(|[by_gain, _]| *by_gain);
+            let by_bias = by_exposure.iter().map(|[_, by_bias]| *by_bias);
+            if exposure.gain_is_free() {
+                rows.eliminate(&[by_bias.collect(), by_gain.collect()]);
+            } else {
+                rows.eliminate(&[by_bias.collect()]);
             }
         }
     }
@@ -88,12 +106,14 @@ impl Linearisation<'_> {
         let stride = pairs.len().div_ceil(2 * self.max_residuals).max(1);
         let share = stride as f64 * f64::from(self.config.silhouette_weight)
             / self.matches.pairs.len() as f64;
+        let loss = self.config.silhouette_loss();
         for pair in pairs.iter().step_by(stride) {
             let at = self.matches.pixels[frame][pair.point_idx as usize];
             let offset = [0, 1].map(|axis| f64::from(at[axis] - pair.target[axis]));
             let distance = offset[0].hypot(offset[1]);
             let excess = distance - f64::from(pair.tolerance);
-            let weight = (share * f64::from(pair.weight)).sqrt();
+            let robust = loss.weight(excess * excess);
+            let weight = (share * f64::from(pair.weight) * robust).sqrt();
             let placed = rows.place(pair.point_idx as usize);
             let direction = offset.map(|offset| offset / distance.max(1e-9));
             let slope = self.by_camera_point(&placed.in_frame, direction);
@@ -107,7 +127,7 @@ impl Linearisation<'_> {
 
     /// Of a derivative by the pixel, the one by the point in the camera: ∂π/∂x (Eq. 1), transposed.
     fn by_camera_point(&self, in_camera: &Vector3<f64>, by_pixel: [f64; 2]) -> Vector3<f64> {
-        let focal = self.observations.intrinsics.focal;
+        let focal = self.intrinsics.focal;
         let inverse_depth = in_camera.z.max(f64::from(NEAR)).recip();
         let [u, v] = [0, 1].map(|axis| by_pixel[axis] * f64::from(focal[axis]) * inverse_depth);
         Vector3::new(u, v, -(u * in_camera.x + v * in_camera.y) * inverse_depth)

@@ -5,6 +5,7 @@ pub mod alternating;
 mod color_slope;
 pub mod correspondences;
 mod evaluation;
+mod exposure;
 mod hypotheses;
 pub mod joint_lbfgs;
 pub mod lbfgs;
@@ -13,6 +14,7 @@ mod linearisation;
 mod normal_equations;
 pub mod objective;
 pub mod observations;
+mod photometric;
 mod progress;
 mod rows;
 mod shape_jacobian;
@@ -40,6 +42,7 @@ use self::{
 };
 pub use self::{
     evaluation::Evaluation,
+    exposure::Exposure,
     hypotheses::{Hypothesis, HypothesisReport},
     progress::{Status, Step},
     uncertainty::{Uncertainty, WithinTwoSigma},
@@ -159,6 +162,8 @@ pub struct Outcome {
     pub iterations: usize,
     /// What became of each initial guess that was tried, in their order.
     pub hypotheses: Vec<HypothesisReport>,
+    /// How each target frame is exposed, at the last level of blur, where that is solved for.
+    pub exposures: Option<Vec<Exposure>>,
     /// Of what was found; Levenberg–Marquardt alone knows it.
     pub uncertainty: Option<Uncertainty>,
 }
@@ -183,7 +188,12 @@ pub fn bundle_adjust(
     };
     let mut progress =
         Progress { observe, stages: Vec::new(), iteration: 0, hypothesis: 0, blur: 0.0 };
-    let hypotheses = &hypotheses[..hypotheses.len().min(config.n_hypotheses.max(1))];
+    let mut hypotheses = hypotheses[..hypotheses.len().min(config.n_hypotheses.max(1))].to_vec();
+    if config.objective.refine_focal {
+        hypotheses
+            .iter_mut()
+            .for_each(|start| start.unknowns = start.unknowns.clone().with_focal());
+    }
     let initial = &hypotheses[0].unknowns;
     let mut runs: Vec<Run> = hypotheses.iter().map(|start| Run::new(start, initial)).collect();
     let last_level = config.blurs.len() - 1;
@@ -210,7 +220,9 @@ pub fn bundle_adjust(
         uncertainty(&objective, &unknowns, last_level, &config.lm, n_observations)
     };
     let known = config.solver == Solver::Lm && !report.status.is_fault();
+    let exposures = || objective.value(&unknowns, last_level).1.exposures;
     Outcome {
+        exposures: config.objective.solve_exposure.then(exposures),
         uncertainty: known.then(certain).flatten(),
         unknowns,
         status: report.status,

@@ -1,4 +1,6 @@
-//! H step = −g, where frames meet only through p_0 and the style: an arrow of a matrix.
+//! H step = −g, where frames meet only through p_0, the style and the focal length: an arrow of a matrix.
+//!
+//! [p_0 | s] stands for all that frames share: the focal length comes after the style, where it is refined.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix6, Vector6};
 
@@ -46,10 +48,10 @@ impl NormalEquations {
         equations
     }
 
-    /// Adds a weighted mean of squares over a style, of which the leading directions are solved for.
-    pub fn add_style_prior(&mut self, weight: f32, style: &[f64]) {
+    /// Adds a weighted mean of squares over a style, of which `n_directions` are solved for.
+    pub fn add_style_prior(&mut self, weight: f32, style: &[f64], n_directions: usize) {
         let weight = f64::from(weight) / style.len().max(1) as f64;
-        for (i, value) in (6..self.shared.nrows()).zip(style) {
+        for (i, value) in (6..6 + n_directions).zip(style) {
             self.shared[(i, i)] += weight;
             self.shared_gradient[i] += weight * value;
         }

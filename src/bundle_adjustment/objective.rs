@@ -1,6 +1,6 @@
 //! L = L_ph + λ L_CD (Eq. 6), with what later work added to make it well behaved.
 
-use burn::tensor::{Device, Tensor, TensorData, s};
+use burn::tensor::{Device, Tensor, s};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -13,7 +13,7 @@ use super::{
 use crate::{
     camera::Pose,
     host::index_tensor,
-    loss::{SilhouettePair, charbonnier, silhouette_distances},
+    loss::{SilhouetteLoss, SilhouetteNorm, SilhouettePair, silhouette_distances},
     pseudo_render::{Footprint, PseudoRenderConfig},
 };
 
@@ -39,7 +39,13 @@ pub struct ObjectiveConfig {
     pub photometric_weight: f32,
     /// Charbonnier scale of a colour difference, RGB in [0, 1]; 0 takes plain squares.
     pub robust_scale: f32,
-    /// Compare colours only where both points fall inside their frames' masks.
+    /// Find the focal length, too: one factor on those given. Perspective alone tells it from distance:
+    /// even a known shape holds it only to some per cent, unless it is near.
+    pub refine_focal: bool,
+    /// Take each target frame to be exposed anew, and find the one gain and bias, shared by its channels,
+    /// with which its colours agree best with the reference's.
+    pub solve_exposure: bool,
+    /// Compare colours only where both points fall inside their frames' masks, where there are any.
     pub within_masks: bool,
     /// Compare colours only where the target frame, too, sees the point.
     pub target_occlusion: bool,
@@ -55,6 +61,13 @@ pub struct ObjectiveConfig {
     pub tolerance_per_blur: f32,
     /// Measure to the silhouette's outline, to a fraction of a pixel, instead of to pixels' centres.
     pub silhouette_outline: bool,
+    /// What a distance beyond its tolerance costs.
+    pub silhouette_norm: SilhouetteNorm,
+    /// Distance in pixels around which a norm that is no square turns from one.
+    pub silhouette_scale: f32,
+    /// Share of each frame's pixels, of the samples of its outline and of its points whose distances,
+    /// the largest of each, are left out: masks may be wrong in parts.
+    pub silhouette_trim: f32,
     /// Let the reference frame's silhouette count, and average over L frames instead of L − 1.
     pub silhouette_of_reference: bool,
     /// Let hidden points count in the silhouette, too: they lie inside it as well, and close the
@@ -72,6 +85,8 @@ impl Default for ObjectiveConfig {
             reduction: Reduction::Mean,
             photometric_weight: 1000.0,
             robust_scale: 0.05,
+            refine_focal: false,
+            solve_exposure: false,
             within_masks: true,
             target_occlusion: true,
             silhouette_weight: 40.0,
@@ -79,6 +94,9 @@ impl Default for ObjectiveConfig {
             containment_tolerance: 0.0,
             tolerance_per_blur: 0.3,
             silhouette_outline: true,
+            silhouette_norm: SilhouetteNorm::Squared,
+            silhouette_scale: 1.0,
+            silhouette_trim: 0.0,
             silhouette_of_reference: true,
             silhouette_of_hidden_points: true,
             style_weight: 1.0,
@@ -88,6 +106,10 @@ impl Default for ObjectiveConfig {
 }
 
 impl ObjectiveConfig {
+    pub(super) fn silhouette_loss(&self) -> SilhouetteLoss {
+        SilhouetteLoss { norm: self.silhouette_norm, scale: self.silhouette_scale }
+    }
+
     /// Eq. 6 as printed: sums of squares, λ = 0.01, Δp_l about the camera.
     pub fn paper() -> Self {
         Self {
@@ -95,6 +117,8 @@ impl ObjectiveConfig {
             reduction: Reduction::Sum,
             photometric_weight: 1.0,
             robust_scale: 0.0,
+            refine_focal: false,
+            solve_exposure: false,
             within_masks: false,
             target_occlusion: false,
             silhouette_weight: 0.01,
@@ -102,6 +126,9 @@ impl ObjectiveConfig {
             containment_tolerance: 0.0,
             tolerance_per_blur: 0.0,
             silhouette_outline: false,
+            silhouette_norm: SilhouetteNorm::Squared,
+            silhouette_scale: 1.0,
+            silhouette_trim: 0.0,
             silhouette_of_reference: false,
             silhouette_of_hidden_points: false,
             style_weight: 0.0,
@@ -120,6 +147,15 @@ pub struct Objective<'a> {
     pub config: &'a ObjectiveConfig,
     /// Where the graph lives; it differentiates.
     pub device: Device,
+}
+
+/// A cloud and the cameras that see it, on the graph.
+pub(super) struct Scene {
+    pub points: Tensor<3>, // [1, n, 3], in the world
+    /// One for each frame.
+    pub poses: Pose,
+    /// Log of the factor on the focal length, where it is an unknown: `[1, 1]`.
+    pub log_focal: Option<Tensor<2>>,
 }
 
 /// L_ph and L_CD on the graph, unweighted, and what they compare.
@@ -190,26 +226,24 @@ impl Objective<'_> {
         let frames: Vec<usize> = std::iter::once(0).chain(targets.iter().copied()).collect();
         let frame_idx = frames.iter().map(|&frame| frame as i64).collect();
         let poses = unknowns.poses(leaves).select(index_tensor(frame_idx, &points_in_world));
-        let cloud = (&points_in_world, &poses);
-        let matches = Correspondences::new(self.observations, frames, cloud, self.config, level);
-        Terms {
-            photometric: self.photometric(&matches, cloud, level),
-            silhouette: self.silhouette(&matches, cloud),
-            matches,
-        }
+        let intrinsics = unknowns.intrinsics(&self.observations.intrinsics);
+        let cloud = (&points_in_world, &poses, &intrinsics);
+        let mut matches =
+            Correspondences::new(self.observations, frames, cloud, self.config, level);
+        let scene = Scene { points: points_in_world, poses, log_focal: leaves.log_focal.clone() };
+        let (photometric, exposures) = self.photometric(&matches, &scene, level);
+        matches.exposures = exposures;
+        Terms { photometric, silhouette: self.silhouette(&matches, &scene), matches }
     }
 
     /// L_CD (Eq. 5), over the frames that have a silhouette.
-    fn silhouette(
-        &self,
-        matches: &Correspondences,
-        (points, poses): (&Tensor<3>, &Pose),
-    ) -> Tensor<1> {
+    fn silhouette(&self, matches: &Correspondences, scene: &Scene) -> Tensor<1> {
+        let points = &scene.points;
         let of_frame = |(frame, pairs): &(usize, Vec<SilhouettePair>)| {
-            let pose = poses.clone().select(index_tensor(vec![*frame as i64], points));
+            let pose = scene.poses.clone().select(index_tensor(vec![*frame as i64], points));
             let point_idx = pairs.iter().map(|pair| i64::from(pair.point_idx)).collect();
-            let pixels = self.pixels(points, point_idx, &pose); // [1, pairs, 2]
-            silhouette_distances(pixels.squeeze_dim(0), pairs)
+            let pixels = self.pixels(scene, point_idx, &pose); // [1, pairs, 2]
+            silhouette_distances(pixels.squeeze_dim(0), pairs, self.config.silhouette_loss())
         };
         let paired = matches.pairs.iter().filter(|(_, pairs)| !pairs.is_empty());
         let sum = paired.map(of_frame).reduce(|sum, distances| sum + distances);
@@ -218,46 +252,18 @@ impl Objective<'_> {
     }
 
     /// Where some points land in each view, `[views, points, 2]`.
-    fn pixels(&self, points: &Tensor<3>, point_idx: Vec<i64>, poses: &Pose) -> Tensor<3> {
-        let points = points.clone().select(1, index_tensor(point_idx, points));
-        self.observations.intrinsics.project(poses.camera_from_world(points)).pixels
-    }
-
-    /// L_ph (Eq. 3), over the points that the reference frame sees.
-    fn photometric(
-        &self,
-        matches: &Correspondences,
-        (points, poses): (&Tensor<3>, &Pose),
-        level: usize,
-    ) -> Tensor<1> {
-        let [_, n, _] = points.dims();
-        let (n_targets, seen) = (matches.frames.len() - 1, &matches.visible[0]);
-        if n_targets == 0 {
-            return Tensor::zeros([1], &points.device());
+    pub(super) fn pixels(&self, scene: &Scene, point_idx: Vec<i64>, poses: &Pose) -> Tensor<3> {
+        let points = scene.points.clone().select(1, index_tensor(point_idx, &scene.points));
+        let mut in_camera = poses.camera_from_world(points);
+        if let Some(log_focal) = &scene.log_focal {
+            // To project with k f is to project [k x, k y, z] with f.
+            let factor = log_focal.clone().exp().unsqueeze_dim::<3>(0); // [1, 1, 1]
+            let [b, n, _] = in_camera.dims();
+            let depth = in_camera.clone().slice(s![.., .., 2..3]);
+            let sideways = in_camera.slice(s![.., .., 0..2]) * factor.expand([b, n, 2]);
+            in_camera = Tensor::cat(vec![sideways, depth], 2);
         }
-        if seen.is_empty() {
-            // Nothing to compare is the worst that can be, not the best: all three channels of
-            // every point are as wrong as colours can be.
-            let worst = match self.config.reduction {
-                Reduction::Sum => 3.0 * (n_targets * n) as f32,
-                Reduction::Mean => 3.0,
-            };
-            return Tensor::from_floats([worst], &points.device());
-        }
-        let pixels = self.pixels(points, seen.iter().map(|&i| i64::from(i)).collect(), poses);
-        let images = &self.observations.images[level];
-        let colors = images.sample_bilinear(&matches.frames, pixels);
-        let residuals = colors.clone().slice(s![0..1]) - colors.slice(s![1..]); // [t, m, 3]
-        let mut squared = residuals.square().sum_dim(2).squeeze_dim::<2>(2);
-        if self.config.robust_scale > 0.0 {
-            squared = charbonnier(squared, self.config.robust_scale);
-        }
-        let weights = TensorData::new(matches.comparable.concat(), [n_targets, seen.len()]);
-        let sum = (squared * Tensor::from_data(weights, &self.device.clone().inner())).sum();
-        match self.config.reduction {
-            Reduction::Sum => sum,
-            Reduction::Mean => sum / matches.n_compared(),
-        }
+        self.observations.intrinsics.project(in_camera).pixels
     }
 }
 

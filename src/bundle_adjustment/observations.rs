@@ -30,8 +30,10 @@ pub struct Observations {
     pub(super) images: Vec<ImageTable>,
     /// The same on the host.
     pub(super) host_images: Vec<Vec<ColorImage>>,
+    /// None of a frame that has no mask.
     pub(super) silhouettes: Vec<Option<Silhouette>>,
-    /// For each frame, whether a pixel and its neighbours hold nothing of the background.
+    /// For each frame, whether a pixel and its neighbours hold nothing of the background, as far as is
+    /// known: without a mask, all may be the object.
     interiors: Vec<Vec<bool>>,
 }
 
@@ -52,11 +54,18 @@ impl Observations {
             images: host_images.iter().map(|level| ImageTable::new(level, device)).collect(),
             host_images,
             silhouettes: frames.iter().map(|frame| Silhouette::new(&frame.mask)).collect(),
-            interiors: frames.iter().map(|frame| interior(&frame.mask)).collect(),
+            interiors: frames
+                .iter()
+                .map(|frame| match frame.has_mask() {
+                    true => interior(&frame.mask),
+                    false => vec![true; frame.mask.pixels().len()],
+                })
+                .collect(),
         }
     }
 
-    /// Whether a location of a frame shows the object and nothing else.
+    /// Whether a location of a frame shows the object and nothing else; if it has no mask, whether it is
+    /// in the frame.
     pub(super) fn shows_object(&self, frame: usize, [u, v]: [f32; 2]) -> bool {
         let inside = u >= 0.0 && v >= 0.0 && u < self.size[0] as f32 && v < self.size[1] as f32;
         inside && self.interiors[frame][v as usize * self.size[0] + u as usize]
@@ -66,7 +75,12 @@ impl Observations {
 /// A blur that keeps the background out of the object: blur(M I) / blur(M).
 ///
 /// A plain one lets the background bleed into the outline, which then moves with the estimate.
+///
+/// Without a mask there is no other.
 fn blurred_object(frame: &Frame, sigma: f32) -> ColorImage {
+    if !frame.has_mask() {
+        return blur(&frame.color, sigma);
+    }
     let (width, height) = frame.color.dimensions();
     let coverage = |u, v| frame.mask.get_pixel(u, v)[0];
     let object = ColorImage::from_fn(width, height, |u, v| {
@@ -98,6 +112,7 @@ fn interior(mask: &ScalarImage) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::device::Backend;
     use image::Luma;
 
     /// A grey disc on a red ground.
@@ -120,6 +135,29 @@ mod tests {
             let color = blurred.get_pixel(u, v).0;
             assert!(color.iter().all(|c| (c - 0.5).abs() < 1e-3), "{color:?} {coverage:?}");
         }
+    }
+
+    #[test]
+    fn a_frame_without_a_mask_is_blurred_as_a_whole_and_may_show_the_object_anywhere() {
+        let unknown = Frame { mask: ScalarImage::new(32, 32), ..frame() };
+        let expected = blur(&unknown.color, 2.0);
+        assert_ne!(expected, unknown.color);
+        let sequence = Sequence {
+            name: "disc".into(),
+            intrinsics: Intrinsics { focal: [30.0; 2], center: [16.0; 2] },
+            size: [32, 32],
+            frames: vec![frame(), unknown],
+            truth: None,
+        };
+        let observations = Observations::new(&sequence, &[2.0], &Backend::Flex.device());
+        assert_eq!(observations.host_images[0][1], expected);
+        assert!(observations.silhouettes[0].is_some() && observations.silhouettes[1].is_none());
+        let shown = |frame, at| observations.shows_object(frame, at);
+        assert_eq!([shown(0, [16.0; 2]), shown(0, [1.0; 2])], [true, false]);
+        assert_eq!(
+            [shown(1, [1.0; 2]), shown(1, [31.9; 2]), shown(1, [33.0; 2])],
+            [true, true, false]
+        );
     }
 
     #[test]

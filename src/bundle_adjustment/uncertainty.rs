@@ -31,7 +31,7 @@ pub struct Uncertainty {
     /// For each point, the root of its expected squared distance from where it should be, in world
     /// units. Style directions that are not solved for count as known.
     pub points: Vec<f64>,
-    /// Of the small steps [p_0 | s | Δp_1 | …] that all of these follow from.
+    /// Of the small steps [p_0 | s | focal | Δp_1 | …] that all of these follow from.
     pub steps: DMatrix<f64>,
 }
 
@@ -59,7 +59,7 @@ pub(super) fn uncertainty(
     let equations = normal_equations(objective, unknowns, level, &shape, &matches, config);
     let inverse = equations.hessian().cholesky()?.inverse();
     let covariance = inverse * (found.objective / n_observations);
-    let n_shared = 6 + shape.n_directions();
+    let n_shared = 6 + shape.n_directions() + unknowns.focal().len();
     let poses = unknowns.host_poses(&objective.device);
     covariance.iter().all(|x| x.is_finite()).then(|| Uncertainty {
         poses: pose_covariances(&covariance, &poses, n_shared),

@@ -1,4 +1,4 @@
-//! {p_0, Δp_l, s}: what bundle adjustment solves for, as one flat vector that solvers share.
+//! {p_0, Δp_l, s}, and the focal length if asked for: what bundle adjustment solves for, as one flat vector that solvers share.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use burn::tensor::{DType, Device, Tensor, TensorData};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::camera::Pose;
+use crate::camera::{Intrinsics, Pose};
 
 /// How Δp_l acts on p_0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,13 +19,16 @@ pub enum Parameterisation {
     CameraCentred,
 }
 
-/// The unknowns: p_0, as a twist about the initial reference pose, then each Δp_l, then the style.
+/// The unknowns: p_0, as a twist about the initial reference pose, then each Δp_l, then the log of a
+/// factor on the focal length, where that is refined, then the style.
 ///
 /// Twists are `[φn, t]`, radians and world units, in SO(3) × R³.
 #[derive(Clone, Debug)]
 pub struct Unknowns {
     pub values: Vec<f64>,
     n_frames: usize,
+    /// Whether the focal length is an unknown.
+    refines_focal: bool,
     initial_reference: Isometry3<f32>,
     parameterisation: Parameterisation,
 }
@@ -34,7 +37,9 @@ pub struct Unknowns {
 pub struct Leaves {
     pub reference_twist: Tensor<2>, // [1, 6]
     pub relative_twists: Tensor<2>, // [L − 1, 6]
-    pub style: Tensor<2>,           // [1, k]
+    /// The log of a factor on the focal length, `[1, 1]`, where it is an unknown.
+    pub log_focal: Option<Tensor<2>>,
+    pub style: Tensor<2>, // [1, k]
 }
 
 impl Unknowns {
@@ -47,7 +52,13 @@ impl Unknowns {
     ) -> Self {
         let mut values = vec![0.0; 6 * n_frames];
         values.extend(style.iter().map(|&s| f64::from(s)));
-        Self { values, n_frames, initial_reference: reference_pose, parameterisation }
+        Self {
+            values,
+            n_frames,
+            refines_focal: false,
+            initial_reference: reference_pose,
+            parameterisation,
+        }
     }
 
     /// Starts every frame from a pose of its own.
@@ -72,10 +83,19 @@ impl Unknowns {
         unknowns
     }
 
+    /// The focal length, too, from where it is given on.
+    pub fn with_focal(mut self) -> Self {
+        if !self.refines_focal {
+            self.values.insert(6 * self.n_frames, 0.0);
+            self.refines_focal = true;
+        }
+        self
+    }
+
     /// The same poses, and another style.
     pub fn with_style(&self, style: &[f32]) -> Self {
         let mut unknowns = self.clone();
-        unknowns.values.truncate(6 * self.n_frames);
+        unknowns.values.truncate(self.style().start);
         unknowns.values.extend(style.iter().map(|&s| f64::from(s)));
         unknowns
     }
@@ -93,9 +113,20 @@ impl Unknowns {
         6..6 * self.n_frames
     }
 
+    /// Where the log of the focal length's factor lies in `values`: nowhere, if it is no unknown.
+    pub fn focal(&self) -> Range<usize> {
+        6 * self.n_frames..6 * self.n_frames + usize::from(self.refines_focal)
+    }
+
     /// Where the style lies in `values`.
     pub fn style(&self) -> Range<usize> {
-        6 * self.n_frames..self.values.len()
+        self.focal().end..self.values.len()
+    }
+
+    /// The camera, of which `given` is what is known beforehand.
+    pub fn intrinsics(&self, given: &Intrinsics) -> Intrinsics {
+        let factor = self.values[self.focal()].first().map_or(1.0, |log_focal| log_focal.exp());
+        Intrinsics { focal: given.focal.map(|focal| focal * factor as f32), ..*given }
     }
 
     pub fn n_frames(&self) -> usize {
@@ -115,13 +146,14 @@ impl Unknowns {
         Leaves {
             reference_twist: leaf(Self::REFERENCE, 6),
             relative_twists: leaf(self.relatives(), 6),
+            log_focal: self.refines_focal.then(|| leaf(self.focal(), 1)),
             style: leaf(self.style(), self.style().len().max(1)),
         }
     }
 
     /// The unknowns after a small step: rotations step on the left, R ← exp(δω) R, the rest adds up.
     ///
-    /// `step` is laid out as [p_0 | s | Δp_1 | …], with the leading `n_directions` of the style.
+    /// `step` is laid out as [p_0 | s | focal | Δp_1 | …], with the leading `n_directions` of the style.
     pub fn stepped(&self, step: &[f64], n_directions: usize) -> Self {
         let mut unknowns = self.clone();
         let turn_by = |twist: &mut [f64], step: &[f64]| {
@@ -132,8 +164,11 @@ impl Unknowns {
         };
         turn_by(&mut unknowns.values[Self::REFERENCE], &step[..6]);
         for l in 1..self.n_frames {
-            let start = 6 + n_directions + 6 * (l - 1);
+            let start = 6 + n_directions + self.focal().len() + 6 * (l - 1);
             turn_by(&mut unknowns.values[Self::relative(l)], &step[start..start + 6]);
+        }
+        for (i, idx) in (6 + n_directions..).zip(self.focal()) {
+            unknowns.values[idx] += step[i];
         }
         let style = self.style().start;
         (0..n_directions).for_each(|i| unknowns.values[style + i] += step[6 + i]);
@@ -175,5 +210,7 @@ pub(super) fn flatten(leaves: &Leaves, gradients: &burn::tensor::Gradients) -> V
         }
         None => vec![0.0; leaf.dims().iter().product()],
     };
-    [of(&leaves.reference_twist), of(&leaves.relative_twists), of(&leaves.style)].concat()
+    let log_focal = leaves.log_focal.as_ref().map(of).unwrap_or_default();
+    [of(&leaves.reference_twist), of(&leaves.relative_twists), log_focal, of(&leaves.style)]
+        .concat()
 }

@@ -18,7 +18,7 @@ use super::{
     surface::sample_surface,
     viewpoint::{Viewpoint, ViewpointRange, between, box_in_frame, projected_box},
 };
-use crate::camera::Intrinsics;
+use crate::{camera::Intrinsics, silhouette::MASK_THRESHOLD};
 
 /// Pictures of one object by one camera.
 #[derive(Clone, Debug)]
@@ -37,8 +37,15 @@ pub struct Frame {
     /// The picture's file, relative to the sequence's folder.
     pub path: PathBuf,
     pub color: ColorImage,
-    /// How much of each pixel the object covers, in [0, 1].
+    /// How much of each pixel the object covers, in [0, 1]; zero everywhere if it is not known.
     pub mask: ScalarImage,
+}
+
+impl Frame {
+    /// Whether it is known where the object is.
+    pub fn has_mask(&self) -> bool {
+        self.mask.pixels().any(|coverage| coverage.0[0] > MASK_THRESHOLD)
+    }
 }
 
 /// What is known of how the pictures came about.

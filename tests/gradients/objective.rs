@@ -16,6 +16,7 @@ use object_pba::{
         ColorImage, ScalarImage,
         sequence::{Frame, Sequence},
     },
+    loss::SilhouetteNorm,
     pseudo_render::visible_points,
     shape_prior::ShapePriorConfig,
 };
@@ -25,6 +26,18 @@ use crate::{DEVICE, check_gradient, scattered, vector};
 const SIZE: [usize; 2] = [48, 40];
 const N_FRAMES: usize = 3;
 const N_POINTS: usize = 64;
+
+/// Ours, ours with everything that may be switched on, and the paper's.
+fn configs() -> [ObjectiveConfig; 3] {
+    let all = ObjectiveConfig {
+        refine_focal: true,
+        solve_exposure: true,
+        silhouette_norm: SilhouetteNorm::Unsquared,
+        silhouette_trim: 0.1,
+        ..ObjectiveConfig::default()
+    };
+    [ObjectiveConfig::paper(), ObjectiveConfig::default(), all]
+}
 
 /// Smooth pictures of a disc, each a little unlike the last.
 fn sequence() -> Sequence {
@@ -67,6 +80,11 @@ fn unknowns(style: &[f64], distance: f32, config: &ObjectiveConfig) -> Unknowns 
         .map(|turn| Isometry3::new(Vector3::new(0.01, -0.02, distance), turn * Vector3::y()))
         .to_vec();
     let mut unknowns = Unknowns::with_poses(&poses, &[], config.parameterisation);
+    if config.refine_focal {
+        unknowns = unknowns.with_focal();
+        let focal = unknowns.focal();
+        unknowns.values[focal].fill(0.04);
+    }
     unknowns.values.extend(style);
     unknowns
 }
@@ -80,7 +98,7 @@ fn evaluate(shape: &dyn ShapeModel, unknowns: &Unknowns, config: &ObjectiveConfi
 
 #[track_caller]
 fn check_objective(shape: &dyn ShapeModel, style: &[f64]) {
-    for config in [ObjectiveConfig::paper(), ObjectiveConfig::default()] {
+    for config in configs() {
         let unknowns = unknowns(style, 2.0, &config);
         check_gradient(&unknowns.values.clone(), |values| {
             let mut unknowns = unknowns.clone();
@@ -125,10 +143,10 @@ fn the_objective_of_poses_and_style() {
 
 #[test]
 fn points_that_no_frame_sees_have_no_gradient() {
-    for paper_or_ours in [ObjectiveConfig::paper(), ObjectiveConfig::default()] {
+    for config in configs() {
         // Without the pull of the style prior, and of silhouettes on points that lie hidden inside them.
         let (style_weight, silhouette_of_hidden_points) = (0.0, false);
-        let config = ObjectiveConfig { style_weight, silhouette_of_hidden_points, ..paper_or_ours };
+        let config = ObjectiveConfig { style_weight, silhouette_of_hidden_points, ..config };
         let unknowns = unknowns(&two_sheets(), 2.0, &config);
         let gradient = evaluate(&FreePoints, &unknowns, &config).gradient;
         let seen = seen_by_any_frame(&unknowns, &config);
@@ -143,7 +161,8 @@ fn points_that_no_frame_sees_have_no_gradient() {
 fn seen_by_any_frame(unknowns: &Unknowns, config: &ObjectiveConfig) -> Vec<bool> {
     let leaves = unknowns.leaves(&DEVICE);
     let points = leaves.style.clone().reshape([1, N_POINTS as i32, 3]);
-    let (poses, intrinsics) = (unknowns.poses(&leaves), sequence().intrinsics);
+    let (poses, intrinsics) =
+        (unknowns.poses(&leaves), unknowns.intrinsics(&sequence().intrinsics));
     let visible = visible_points(points.inner(), &poses, &intrinsics, SIZE, &config.pseudo_render);
     let mut seen = vec![false; N_POINTS];
     visible.concat().iter().for_each(|&point_idx| seen[point_idx as usize] = true);
@@ -152,7 +171,7 @@ fn seen_by_any_frame(unknowns: &Unknowns, config: &ObjectiveConfig) -> Vec<bool>
 
 #[test]
 fn seeing_nothing_costs_more_than_seeing_everything() {
-    for config in [ObjectiveConfig::paper(), ObjectiveConfig::default()] {
+    for config in configs() {
         let in_view = unknowns(&[], 2.0, &config);
         let mut out_of_view = in_view.clone();
         out_of_view.values[3] += 5.0;
@@ -167,7 +186,7 @@ fn seeing_nothing_costs_more_than_seeing_everything() {
 
 #[test]
 fn points_behind_the_camera_have_finite_gradients() {
-    for config in [ObjectiveConfig::paper(), ObjectiveConfig::default()] {
+    for config in configs() {
         // All of the cloud, half of it, and points in the plane of the camera.
         for distance in [-2.0, 0.0, 0.2] {
             let unknowns = unknowns(&two_sheets(), distance, &config);

@@ -11,7 +11,10 @@ use object_pba::{
     chamfer::chamfer_distance,
     data::{ColorImage, ScalarImage},
     host::{host_pixels, index_tensor},
-    loss::{SilhouetteMatching, charbonnier, silhouette_distances, silhouette_pairs},
+    loss::{
+        SilhouetteLoss, SilhouetteMatching, SilhouetteNorm, charbonnier, silhouette_distances,
+        silhouette_pairs,
+    },
     sampling::ImageTable,
     shape_prior::ShapePriorConfig,
     silhouette::Silhouette,
@@ -54,7 +57,12 @@ fn check_pixels(parameterisation: Parameterisation) {
         let pixels = |twists: Tensor<1>| {
             let twist = |start: usize| twists.clone().slice(s![start..start + 6]).reshape([1, 6]);
             let style = Tensor::zeros([1, 1], &*DEVICE);
-            let leaves = Leaves { reference_twist: twist(0), relative_twists: twist(6), style };
+            let leaves = Leaves {
+                reference_twist: twist(0),
+                relative_twists: twist(6),
+                log_focal: None,
+                style,
+            };
             let points_in_camera = unknowns.poses(&leaves).camera_from_world(points.clone());
             mixed(CAMERA.project(points_in_camera).pixels)
         };
@@ -103,15 +111,25 @@ fn silhouette_distances_to_points() {
     let silhouette = Silhouette::new(&disc).expect("a disc");
     let pixels: Vec<f64> = scattered(2 * 2 * 20, 4).iter().map(|x| 14.0 + 12.0 * x).collect();
     let everything: Vec<u32> = (0..40).collect();
-    for (to_outline, tolerances) in [(false, [0.0; 2]), (false, [0.9, 0.6]), (true, [0.3, 0.0])] {
-        let matching = SilhouetteMatching { to_outline, weights: [0.3, 0.7], tolerances };
+    let all = [SilhouetteNorm::Squared, SilhouetteNorm::Unsquared, SilhouetteNorm::Saturating];
+    let matchings = [
+        (false, [0.0; 2], 0.0),
+        (false, [0.9, 0.6], 0.0),
+        (true, [0.3, 0.0], 0.0),
+        (true, [0.3, 0.6], 0.2),
+    ];
+    for (norm, (to_outline, tolerances, trim)) in
+        all.into_iter().flat_map(|norm| matchings.map(|matching| (norm, matching)))
+    {
+        let loss = SilhouetteLoss { norm, scale: 0.8 };
+        let matching = SilhouetteMatching { to_outline, weights: [0.3, 0.7], tolerances, trim };
         let distances = |pixels: Tensor<1>| {
             let pixels = pixels.reshape([1, 40, 2]);
             let projected = &host_pixels(&pixels)[0];
             let pairs = silhouette_pairs(&silhouette, projected, &everything, &matching);
             let point_idx = pairs.iter().map(|pair| i64::from(pair.point_idx)).collect();
             let point_idx = index_tensor(point_idx, &pixels);
-            silhouette_distances(pixels.squeeze_dim::<2>(0).select(0, point_idx), &pairs)
+            silhouette_distances(pixels.squeeze_dim::<2>(0).select(0, point_idx), &pairs, loss)
         };
         check_gradient(&pixels, on_graph(distances));
     }

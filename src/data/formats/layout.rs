@@ -37,6 +37,9 @@ pub struct Reading {
 /// Reads a sequence of any layout: a folder, a `transforms.json` or a video.
 pub fn read_sequence(path: &Path, hints: &SequenceHints) -> Result<Reading> {
     let layout = Layout::detect(path)?;
+    if let Some(masks) = hints.masks.as_ref().filter(|masks| !masks.exists()) {
+        return Err(unusable(masks, "there are no such masks"));
+    }
     // Frames of a video lie here until they are loaded.
     let mut scratch = None;
     let mut listing = match &layout {

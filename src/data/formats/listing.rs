@@ -23,8 +23,6 @@ use crate::{
     },
 };
 
-/// Coverage that some pixel of every mask must reach.
-const COVERED: f32 = 0.5;
 /// Pixels of all frames together, at 16 bytes each: what an ordinary machine holds.
 const MOST_PIXELS: usize = 1 << 28;
 
@@ -85,7 +83,8 @@ impl Listing {
         let load = |shot: &Shot| shot.load(&intrinsics, size);
         let frames: Vec<Result<Frame>> = self.shots.par_iter().map(load).collect();
         // Of several broken frames, the first one is named, whichever thread was faster.
-        let frames = frames.into_iter().collect::<Result<_>>()?;
+        let frames = frames.into_iter().collect::<Result<Vec<Frame>>>()?;
+        self.note_missing_masks(&frames);
         let Self { name, canonical, points, notes, .. } = self;
         let truth = camera_from_world.map(|camera_from_world| Truth {
             camera_from_world,
@@ -102,6 +101,16 @@ impl Listing {
             0 => Ok(None),
             n if n == self.shots.len() => Ok(Some(poses)),
             _ => Err("some frames have a pose and some have none".into()),
+        }
+    }
+
+    fn note_missing_masks(&mut self, frames: &[Frame]) {
+        let missing: Vec<_> = frames.iter().filter(|frame| !frame.has_mask()).collect();
+        if let Some(first) = missing.first() {
+            let (n, of, name) = (missing.len(), frames.len(), first.path.display());
+            let note =
+                format!("{n} of {of} frames have no mask, or an empty one; the first is {name}");
+            self.notes.push(note);
         }
     }
 
@@ -128,15 +137,7 @@ impl Shot {
             let reason = format!("it is {found:?} pixels, and its camera takes {:?}", self.size);
             return Err(unusable(&self.path, &reason));
         }
-        let (mask_path, mask) = self.mask(&picture)?;
-        if mask.dimensions() != (picture.width(), picture.height()) {
-            return Err(unusable(&mask_path, "the mask is not of its picture's size"));
-        }
-        let largest = mask.pixels().map(|coverage| coverage.0[0]).fold(0.0, f32::max);
-        if largest < COVERED {
-            let reason = format!("the mask is empty: its largest value is {largest} of 1");
-            return Err(unusable(&mask_path, &reason));
-        }
+        let mask = self.mask(&picture)?;
         let color = picture.into_rgb32f();
         let pinhole = Calibration { intrinsics: *intrinsics, distortion: Distortion::default() };
         let (color, mask) = if self.calibration == pinhole && self.size == size {
@@ -147,19 +148,24 @@ impl Shot {
         Ok(Frame { path: self.name.clone(), color, mask })
     }
 
-    /// The mask and the file that it is in.
-    fn mask(&self, picture: &DynamicImage) -> Result<(PathBuf, ScalarImage)> {
-        let missing = |reason: &str| unusable(&self.path, reason);
-        let own = |mask: ScalarImage| (self.path.clone(), mask);
-        match &self.mask {
-            MaskSource::File(path) => Ok((path.clone(), pictures::open(path, false)?.to_luma32f())),
-            MaskSource::Alpha => alpha(picture).map(own).ok_or_else(|| {
-                missing("it has neither a mask (mask_path, masks/ or --masks) nor an alpha channel")
-            }),
-            MaskSource::Background => alpha(picture)
-                .or_else(|| off_background(&picture.to_rgb8()))
-                .map(own)
-                .ok_or_else(|| missing("its background is neither transparent, white nor black")),
-        }
+    /// The mask; empty, where there is none.
+    fn mask(&self, picture: &DynamicImage) -> Result<ScalarImage> {
+        let size = (picture.width(), picture.height());
+        let found = match &self.mask {
+            MaskSource::File(path) => {
+                path.exists().then(|| mask_of_size(path, size)).transpose()?
+            }
+            MaskSource::Alpha => alpha(picture),
+            MaskSource::Background => alpha(picture).or_else(|| off_background(&picture.to_rgb8())),
+        };
+        Ok(found.unwrap_or_else(|| ScalarImage::new(size.0, size.1)))
+    }
+}
+
+fn mask_of_size(path: &Path, size: (u32, u32)) -> Result<ScalarImage> {
+    let mask = pictures::open(path, false)?.to_luma32f();
+    match mask.dimensions() == size {
+        true => Ok(mask),
+        false => Err(unusable(path, "the mask is not of its picture's size")),
     }
 }

@@ -174,7 +174,6 @@ fn broken_pictures_are_refused() {
         folder
     };
     let black = |width, height| DynamicImage::from(RgbImage::new(width, height));
-    check_refused(&replaced("masks/frame_000.png", black(4, 3)), "masks/frame_000", "empty");
     check_refused(&replaced("masks/frame_001.png", black(3, 4)), "masks/frame_001", "size");
 
     let folder = replaced("images/frame_001.png", black(8, 6));
@@ -184,10 +183,27 @@ fn broken_pictures_are_refused() {
     check_refused(&folder, "images/frame_001.png", "it is [8, 6] pixels");
     let folder = written(|json| json["w"] = json!(5));
     check_refused(&folder, "images/frame_000.png", "its camera takes [5, 3]");
+}
 
+#[test]
+fn frames_may_lack_masks() {
+    let masked = |folder: &TempDir| {
+        let sequence = read_sequence(folder.path()).expect("it is usable");
+        [0, 1].map(|idx| sequence.frames[idx].has_mask())
+    };
+    let folder = written(|_| ());
+    assert_eq!(masked(&folder), [true, true]);
+    // A mask that its frame names, and is not there.
+    fs::remove_file(folder.path().join("masks/frame_001.png")).expect("it is there");
+    assert_eq!(masked(&folder), [true, false]);
+    // A mask that is empty.
+    let black = DynamicImage::from(RgbImage::new(4, 3));
+    black.save(folder.path().join("masks/frame_000.png")).expect("it is writable");
+    assert_eq!(masked(&folder), [false, false]);
+    // No mask by any habit.
     let folder = written(|json| json["frames"][0]["mask_path"] = Value::Null);
-    fs::remove_dir_all(folder.path().join("masks")).expect("it is there");
-    check_refused(&folder, "images/frame_000", "neither");
+    fs::remove_file(folder.path().join("masks/frame_000.png")).expect("it is there");
+    assert_eq!(masked(&folder), [false, true]);
 }
 
 #[test]
