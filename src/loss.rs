@@ -83,7 +83,13 @@ pub struct SilhouetteMatching {
     pub weights: [f32; 2],
     /// Distances in pixels up to which either counts as matched. Eq. 5 has none, and then asks for
     /// points exactly at the centres of pixels, and for as many of them as there are pixels.
+    ///
+    /// The first is for samples of the outline. Pixels have one of their own, `hole_tolerance`.
     pub tolerances: [f32; 2],
+    /// Distance in pixels up to which a pixel counts as covered. Where the outline is matched, pixels
+    /// inside only tell holes. A tolerance below the spacing of the points would hold each to a pixel,
+    /// while the cloud may slide along under all of them: solvers then hardly move.
+    pub hole_tolerance: f32,
     /// Share of the pixels, of the outline's samples and of the points whose distances, the largest of
     /// each, are left out.
     pub trim: f32,
@@ -99,8 +105,14 @@ pub fn silhouette_pairs(
 ) -> Vec<SilhouettePair> {
     let ([of_pixel, of_point], [coverage, containment]) = (matching.weights, matching.tolerances);
     let grid = PixelGrid::new(silhouette.size(), visible.iter().map(|&i| projected[i as usize]));
-    let cover = |&target: &[f32; 2], weight: f32| {
+    let cover = |&target: &[f32; 2]| {
         let point_idx = visible[grid.nearest(target) as usize];
+        SilhouettePair { point_idx, target, weight: of_pixel, tolerance: matching.hole_tolerance }
+    };
+    let reach = |sample: usize| {
+        let point_idx = visible[grid.nearest(silhouette.outline[sample]) as usize];
+        let target = silhouette.foot(sample, projected[point_idx as usize]);
+        let weight = of_pixel * Silhouette::OUTLINE_WEIGHT;
         SilhouettePair { point_idx, target, weight, tolerance: coverage }
     };
     let contain = |&point_idx: &u32| {
@@ -116,10 +128,9 @@ pub fn silhouette_pairs(
         let beyond = pairs.filter(|pair| pair.squared(projected) > pair.tolerance * pair.tolerance);
         trimmed(beyond.collect(), (matching.trim * n_pairs as f32) as usize, projected)
     };
-    let mut pairs = counted(&mut silhouette.pixels.iter().map(|pixel| cover(pixel, of_pixel)));
+    let mut pairs = counted(&mut silhouette.pixels.iter().map(cover));
     if matching.to_outline {
-        let weight = of_pixel * Silhouette::OUTLINE_WEIGHT;
-        pairs.extend(counted(&mut silhouette.outline.iter().map(|at| cover(at, weight))));
+        pairs.extend(counted(&mut (0..silhouette.outline.len()).map(reach)));
     }
     pairs.extend(counted(&mut visible.iter().map(contain)));
     pairs
@@ -186,6 +197,7 @@ mod tests {
                 to_outline: false,
                 weights: [1.0; 2],
                 tolerances: [0.1; 2],
+                hole_tolerance: 0.1,
                 trim,
             };
             let pairs = silhouette_pairs(&silhouette, &projected, &points, &matching);

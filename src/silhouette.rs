@@ -16,6 +16,8 @@ pub struct Silhouette {
     pub pixels: Vec<[f32; 2]>,
     /// Where coverage crosses one half, sampled about every quarter of a pixel.
     pub outline: Vec<[f32; 2]>,
+    /// Unit length, across the outline at each of its samples.
+    normals: Vec<[f32; 2]>,
     coverage: ScalarImage,
     pixel_search: NearestNeighbours,
     outline_search: Option<NearestNeighbours>,
@@ -32,13 +34,14 @@ impl Silhouette {
         if pixels.is_empty() {
             return None;
         }
-        let outline = outline(mask);
+        let (outline, normals): (Vec<_>, Vec<_>) = outline(mask).into_iter().unzip();
         let search = |points: &[[f32; 2]]| NearestNeighbours::in_plane(points.iter().copied());
         Some(Self {
             pixel_search: search(&pixels),
             outline_search: (!outline.is_empty()).then(|| search(&outline)),
             pixels,
             outline,
+            normals,
             coverage: mask.clone(),
         })
     }
@@ -62,6 +65,15 @@ impl Silhouette {
         }
     }
 
+    /// The foot of a location on the outline's tangent at one of its samples: samples lie apart, and the
+    /// distance along the outline to the nearest of them is none that anything should be pulled across.
+    pub fn foot(&self, sample: usize, location: [f32; 2]) -> [f32; 2] {
+        let (at, normal) = (self.outline[sample], self.normals[sample]);
+        let across: f32 =
+            [0, 1].map(|axis| (location[axis] - at[axis]) * normal[axis]).iter().sum();
+        [0, 1].map(|axis| location[axis] - across * normal[axis])
+    }
+
     /// The location itself where it is inside, else the nearest of the outline.
     ///
     /// Beyond the frame, the coverage of its border goes on: nothing is known there.
@@ -69,7 +81,7 @@ impl Silhouette {
         let [coverage] = bilinear(&self.coverage, location);
         match &self.outline_search {
             Some(search) if coverage <= MASK_THRESHOLD => {
-                self.outline[search.nearest_pixel(location) as usize]
+                self.foot(search.nearest_pixel(location) as usize, location)
             }
             _ => location,
         }
@@ -77,7 +89,7 @@ impl Silhouette {
 }
 
 /// Marching squares over the pixel centres.
-fn outline(mask: &ScalarImage) -> Vec<[f32; 2]> {
+fn outline(mask: &ScalarImage) -> Vec<([f32; 2], [f32; 2])> {
     let (width, height) = mask.dimensions();
     let squares = (1..height).flat_map(|v| (1..width).map(move |u| (u - 1, v - 1)));
     squares.flat_map(|(u, v)| crossings(mask, u, v)).flat_map(samples).collect()
@@ -102,10 +114,13 @@ fn crossings(mask: &ScalarImage, u: u32, v: u32) -> Vec<[[f32; 2]; 2]> {
 }
 
 /// Evenly spread along a segment.
-fn samples([start, end]: [[f32; 2]; 2]) -> impl Iterator<Item = [f32; 2]> {
+fn samples([start, end]: [[f32; 2]; 2]) -> impl Iterator<Item = ([f32; 2], [f32; 2])> {
+    let along = [0, 1].map(|axis| end[axis] - start[axis]);
+    let length = along[0].hypot(along[1]).max(f32::MIN_POSITIVE);
+    let normal = [-along[1] / length, along[0] / length];
     (0..SAMPLES_PER_SEGMENT).map(move |k| {
         let share = (k as f32 + 0.5) / SAMPLES_PER_SEGMENT as f32;
-        [0, 1].map(|axis| start[axis] + share * (end[axis] - start[axis]))
+        ([0, 1].map(|axis| start[axis] + share * along[axis]), normal)
     })
 }
 
@@ -150,6 +165,23 @@ mod tests {
             let [u, v] = disc.nearest_inside(at);
             let moved = (u - at[0]).hypot(v - at[1]);
             assert!((moved - (radius - RADIUS).max(0.0)).abs() < 0.15, "{at:?} moved by {moved}");
+        }
+    }
+
+    /// Samples are a quarter of a pixel apart: from one beside, a foot is as far as the rim itself.
+    #[test]
+    fn a_foot_lies_straight_across_the_outline() {
+        let disc = disc();
+        for (sample, &at) in disc.outline.iter().enumerate() {
+            let out = [0, 1].map(|axis| (at[axis] - CENTER[axis]) / from_center(at));
+            let along = [-out[1], out[0]];
+            let location = [0, 1].map(|axis| at[axis] - 0.4 * out[axis] + 0.3 * along[axis]);
+            let foot = disc.foot(sample, location);
+            let moved = [0, 1].map(|axis| foot[axis] - location[axis]);
+            // Marching squares turn by a few degrees from one pixel to the next.
+            assert!((moved[0].hypot(moved[1]) - 0.4).abs() < 0.1, "{location:?} to {foot:?}");
+            let slid: f32 = (0..2).map(|axis| moved[axis] * along[axis]).sum();
+            assert!(slid.abs() < 0.15, "{location:?} to {foot:?}");
         }
     }
 

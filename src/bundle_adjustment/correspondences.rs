@@ -137,6 +137,7 @@ fn pairs(
     let slack = config.tolerance_per_blur * observations.blurs[level];
     let tolerances = [config.coverage_tolerance * spacing, config.containment_tolerance];
     let tolerances = tolerances.map(|tolerance| tolerance + slack);
+    let hole_tolerance = config.hole_tolerance * spacing + slack;
     let everything: Vec<u32> = (0..pixels[0].len() as u32).collect();
     (first..frames.len())
         .into_par_iter()
@@ -151,7 +152,8 @@ fn pairs(
             };
             let to_outline = config.silhouette_outline;
             let trim = config.silhouette_trim;
-            let matching = SilhouetteMatching { to_outline, weights, tolerances, trim };
+            let matching =
+                SilhouetteMatching { to_outline, weights, tolerances, hole_tolerance, trim };
             Some((f, silhouette_pairs(silhouette, &pixels[f], visible, &matching)))
         })
         .collect()

@@ -51,12 +51,14 @@ pub struct ObjectiveConfig {
     pub target_occlusion: bool,
     /// λ, the weight of L_CD.
     pub silhouette_weight: f32,
-    /// Distance below which a silhouette's pixel counts as covered by a point, in units of
+    /// Distance below which a silhouette's outline counts as reached by a point, in units of
     /// √(image area / N), the spacing if the points filled the image.
     pub coverage_tolerance: f32,
+    /// Distance below which a silhouette's pixel counts as covered by a point, in the same units.
+    pub hole_tolerance: f32,
     /// Distance in pixels below which a point counts as inside the silhouette.
     pub containment_tolerance: f32,
-    /// How much both tolerances grow with each pixel of blur, in pixels: what is seen coarsely need
+    /// How much all three tolerances grow with each pixel of blur, in pixels: what is seen coarsely need
     /// only fit coarsely.
     pub tolerance_per_blur: f32,
     /// Measure to the silhouette's outline, to a fraction of a pixel, instead of to pixels' centres.
@@ -89,8 +91,9 @@ impl Default for ObjectiveConfig {
             solve_exposure: false,
             within_masks: true,
             target_occlusion: true,
-            silhouette_weight: 40.0,
+            silhouette_weight: 600.0,
             coverage_tolerance: 0.3,
+            hole_tolerance: 1.2,
             containment_tolerance: 0.0,
             tolerance_per_blur: 0.3,
             silhouette_outline: true,
@@ -99,7 +102,7 @@ impl Default for ObjectiveConfig {
             silhouette_trim: 0.0,
             silhouette_of_reference: true,
             silhouette_of_hidden_points: true,
-            style_weight: 1.0,
+            style_weight: 0.2,
             pseudo_render: PseudoRenderConfig::default(),
         }
     }
@@ -123,6 +126,7 @@ impl ObjectiveConfig {
             target_occlusion: false,
             silhouette_weight: 0.01,
             coverage_tolerance: 0.0,
+            hole_tolerance: 0.0,
             containment_tolerance: 0.0,
             tolerance_per_blur: 0.0,
             silhouette_outline: false,
