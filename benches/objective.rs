@@ -236,7 +236,8 @@ mod parts {
         let matching = SilhouetteMatching {
             to_outline: true,
             weights: [1.0; 2],
-            tolerances: [0.3, 0.0],
+            tolerances: [0.25, 0.0],
+            hole_tolerance: 1.0,
             trim: 0.0,
         };
         bencher.bench(|| {

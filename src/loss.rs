@@ -86,8 +86,8 @@ pub struct SilhouetteMatching {
     ///
     /// The first is for samples of the outline. Pixels have one of their own, `hole_tolerance`.
     pub tolerances: [f32; 2],
-    /// Distance in pixels up to which a pixel counts as covered. Where the outline is matched, pixels
-    /// inside only tell holes. A tolerance below the spacing of the points would hold each to a pixel,
+    /// Distance in pixels up to which a pixel counts as covered, and along the outline up to which a
+    /// point reaches it. Where the outline is matched, pixels inside only tell holes. A tolerance below the spacing of the points would hold each to a pixel,
     /// while the cloud may slide along under all of them: solvers then hardly move.
     pub hole_tolerance: f32,
     /// Share of the pixels, of the outline's samples and of the points whose distances, the largest of
@@ -111,7 +111,8 @@ pub fn silhouette_pairs(
     };
     let reach = |sample: usize| {
         let point_idx = visible[grid.nearest(silhouette.outline[sample]) as usize];
-        let target = silhouette.foot(sample, projected[point_idx as usize]);
+        let at = projected[point_idx as usize];
+        let target = silhouette.foot(sample, at, matching.hole_tolerance);
         let weight = of_pixel * Silhouette::OUTLINE_WEIGHT;
         SilhouettePair { point_idx, target, weight, tolerance: coverage }
     };

@@ -16,8 +16,10 @@ pub struct Silhouette {
     pub pixels: Vec<[f32; 2]>,
     /// Where coverage crosses one half, sampled about every quarter of a pixel.
     pub outline: Vec<[f32; 2]>,
-    /// Unit length, across the outline at each of its samples.
-    normals: Vec<[f32; 2]>,
+    /// The outline's direction at each of its samples, of unit length, and the length in pixels that
+    /// each stands for.
+    tangents: Vec<[f32; 2]>,
+    lengths: Vec<f32>,
     coverage: ScalarImage,
     pixel_search: NearestNeighbours,
     outline_search: Option<NearestNeighbours>,
@@ -34,14 +36,16 @@ impl Silhouette {
         if pixels.is_empty() {
             return None;
         }
-        let (outline, normals): (Vec<_>, Vec<_>) = outline(mask).into_iter().unzip();
+        let samples = outline(mask);
+        let outline: Vec<_> = samples.iter().map(|sample| sample.at).collect();
         let search = |points: &[[f32; 2]]| NearestNeighbours::in_plane(points.iter().copied());
         Some(Self {
             pixel_search: search(&pixels),
             outline_search: (!outline.is_empty()).then(|| search(&outline)),
             pixels,
             outline,
-            normals,
+            tangents: samples.iter().map(|sample| sample.tangent).collect(),
+            lengths: samples.iter().map(|sample| sample.length).collect(),
             coverage: mask.clone(),
         })
     }
@@ -65,13 +69,14 @@ impl Silhouette {
         }
     }
 
-    /// The foot of a location on the outline's tangent at one of its samples: samples lie apart, and the
-    /// distance along the outline to the nearest of them is none that anything should be pulled across.
-    pub fn foot(&self, sample: usize, location: [f32; 2]) -> [f32; 2] {
-        let (at, normal) = (self.outline[sample], self.normals[sample]);
-        let across: f32 =
-            [0, 1].map(|axis| (location[axis] - at[axis]) * normal[axis]).iter().sum();
-        [0, 1].map(|axis| location[axis] - across * normal[axis])
+    /// The location nearest to another within `reach` pixels along the outline's tangent at a sample.
+    ///
+    /// Samples lie apart: what is off along the outline by less is none that anything should be pulled
+    /// across.
+    pub fn foot(&self, sample: usize, location: [f32; 2], reach: f32) -> [f32; 2] {
+        let (at, tangent) = (self.outline[sample], self.tangents[sample]);
+        let along: f32 = (0..2).map(|axis| (location[axis] - at[axis]) * tangent[axis]).sum();
+        [0, 1].map(|axis| at[axis] + along.clamp(-reach, reach) * tangent[axis])
     }
 
     /// The location itself where it is inside, else the nearest of the outline.
@@ -81,15 +86,23 @@ impl Silhouette {
         let [coverage] = bilinear(&self.coverage, location);
         match &self.outline_search {
             Some(search) if coverage <= MASK_THRESHOLD => {
-                self.foot(search.nearest_pixel(location) as usize, location)
+                let sample = search.nearest_pixel(location) as usize;
+                self.foot(sample, location, 0.5 * self.lengths[sample])
             }
             _ => location,
         }
     }
 }
 
+/// A piece of the outline: its middle, its direction and its length, in pixels.
+struct Sample {
+    at: [f32; 2],
+    tangent: [f32; 2],
+    length: f32,
+}
+
 /// Marching squares over the pixel centres.
-fn outline(mask: &ScalarImage) -> Vec<([f32; 2], [f32; 2])> {
+fn outline(mask: &ScalarImage) -> Vec<Sample> {
     let (width, height) = mask.dimensions();
     let squares = (1..height).flat_map(|v| (1..width).map(move |u| (u - 1, v - 1)));
     squares.flat_map(|(u, v)| crossings(mask, u, v)).flat_map(samples).collect()
@@ -113,14 +126,15 @@ fn crossings(mask: &ScalarImage, u: u32, v: u32) -> Vec<[[f32; 2]; 2]> {
     found.chunks_exact(2).map(|ends| [ends[0], ends[1]]).collect()
 }
 
-/// Evenly spread along a segment.
-fn samples([start, end]: [[f32; 2]; 2]) -> impl Iterator<Item = ([f32; 2], [f32; 2])> {
-    let along = [0, 1].map(|axis| end[axis] - start[axis]);
-    let length = along[0].hypot(along[1]).max(f32::MIN_POSITIVE);
-    let normal = [-along[1] / length, along[0] / length];
+/// Pieces of equal length that make up a segment; one that begins where it ends has no direction.
+fn samples([start, end]: [[f32; 2]; 2]) -> impl Iterator<Item = Sample> {
+    let offset = [0, 1].map(|axis| end[axis] - start[axis]);
+    let length = offset[0].hypot(offset[1]);
+    let tangent = offset.map(|x| if length > 0.0 { x / length } else { 0.0 });
     (0..SAMPLES_PER_SEGMENT).map(move |k| {
         let share = (k as f32 + 0.5) / SAMPLES_PER_SEGMENT as f32;
-        ([0, 1].map(|axis| start[axis] + share * along[axis]), normal)
+        let at = [0, 1].map(|axis| start[axis] + share * offset[axis]);
+        Sample { at, tangent, length: length / SAMPLES_PER_SEGMENT as f32 }
     })
 }
 
@@ -168,20 +182,23 @@ mod tests {
         }
     }
 
-    /// Samples are a quarter of a pixel apart: from one beside, a foot is as far as the rim itself.
+    /// From a location that is 0.4 px inside of a sample and 0.3 px beside it.
     #[test]
-    fn a_foot_lies_straight_across_the_outline() {
+    fn a_foot_lies_straight_across_the_outline_within_its_reach() {
         let disc = disc();
-        for (sample, &at) in disc.outline.iter().enumerate() {
+        let pieces =
+            disc.outline.iter().enumerate().filter(|(sample, _)| disc.lengths[*sample] > 0.1);
+        for (sample, &at) in pieces {
             let out = [0, 1].map(|axis| (at[axis] - CENTER[axis]) / from_center(at));
             let along = [-out[1], out[0]];
             let location = [0, 1].map(|axis| at[axis] - 0.4 * out[axis] + 0.3 * along[axis]);
-            let foot = disc.foot(sample, location);
-            let moved = [0, 1].map(|axis| foot[axis] - location[axis]);
-            // Marching squares turn by a few degrees from one pixel to the next.
-            assert!((moved[0].hypot(moved[1]) - 0.4).abs() < 0.1, "{location:?} to {foot:?}");
-            let slid: f32 = (0..2).map(|axis| moved[axis] * along[axis]).sum();
-            assert!(slid.abs() < 0.15, "{location:?} to {foot:?}");
+            let distance = |reach: f32| {
+                let foot = disc.foot(sample, location, reach);
+                (foot[0] - location[0]).hypot(foot[1] - location[1])
+            };
+            // Marching squares turn by some degrees from one pixel to the next.
+            assert!((distance(1.0) - 0.4).abs() < 0.12, "{location:?}: {}", distance(1.0));
+            assert!((distance(0.0) - 0.5).abs() < 1e-5, "{location:?}: {}", distance(0.0));
         }
     }
 

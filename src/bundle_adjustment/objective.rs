@@ -54,7 +54,8 @@ pub struct ObjectiveConfig {
     /// Distance below which a silhouette's outline counts as reached by a point, in units of
     /// √(image area / N), the spacing if the points filled the image.
     pub coverage_tolerance: f32,
-    /// Distance below which a silhouette's pixel counts as covered by a point, in the same units.
+    /// Distance below which a silhouette's pixel counts as covered by a point, and along the outline
+    /// below which a point reaches it, in the same units.
     pub hole_tolerance: f32,
     /// Distance in pixels below which a point counts as inside the silhouette.
     pub containment_tolerance: f32,

@@ -122,7 +122,9 @@ fn silhouette_distances_to_points() {
         all.into_iter().flat_map(|norm| matchings.map(|matching| (norm, matching)))
     {
         let loss = SilhouetteLoss { norm, scale: 0.8 };
-        let matching = SilhouetteMatching { to_outline, weights: [0.3, 0.7], tolerances, trim };
+        let weights = [0.3, 0.7];
+        let hole_tolerance = 1.5 * tolerances[0];
+        let matching = SilhouetteMatching { to_outline, weights, tolerances, hole_tolerance, trim };
         let distances = |pixels: Tensor<1>| {
             let pixels = pixels.reshape([1, 40, 2]);
             let projected = &host_pixels(&pixels)[0];
