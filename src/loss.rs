@@ -3,7 +3,10 @@
 use burn::tensor::{Tensor, TensorData};
 use serde::{Deserialize, Serialize};
 
-use crate::{pixel_grid::PixelGrid, silhouette::Silhouette};
+use crate::{
+    pixel_grid::PixelGrid,
+    silhouette::{Silhouette, Target},
+};
 
 /// Charbonnier's loss of a squared residual, 2σ²(√(1 + r²/σ²) − 1): r² near zero, 2σ|r| far out.
 pub fn charbonnier<const D: usize>(squared: Tensor<D>, scale: f32) -> Tensor<D> {
@@ -60,7 +63,7 @@ impl SilhouetteLoss {
 pub struct SilhouettePair {
     pub point_idx: u32,
     /// A pixel's centre, or of the outline.
-    pub target: [f32; 2],
+    pub target: Target,
     pub weight: f32,
     /// Distance in pixels from which on the pair counts.
     pub tolerance: f32,
@@ -69,8 +72,8 @@ pub struct SilhouettePair {
 impl SilhouettePair {
     /// Squared distance in pixels from where its point is projected.
     fn squared(&self, projected: &[[f32; 2]]) -> f32 {
-        let [u, v] = projected[self.point_idx as usize];
-        (u - self.target[0]).powi(2) + (v - self.target[1]).powi(2)
+        let [u, v] = self.target.offset(projected[self.point_idx as usize]);
+        u * u + v * v
     }
 }
 
@@ -105,14 +108,14 @@ pub fn silhouette_pairs(
 ) -> Vec<SilhouettePair> {
     let ([of_pixel, of_point], [coverage, containment]) = (matching.weights, matching.tolerances);
     let grid = PixelGrid::new(silhouette.size(), visible.iter().map(|&i| projected[i as usize]));
-    let cover = |&target: &[f32; 2]| {
-        let point_idx = visible[grid.nearest(target) as usize];
+    let cover = |&pixel: &[f32; 2]| {
+        let (point_idx, target) = (visible[grid.nearest(pixel) as usize], pixel.into());
         SilhouettePair { point_idx, target, weight: of_pixel, tolerance: matching.hole_tolerance }
     };
     let reach = |sample: usize| {
         let point_idx = visible[grid.nearest(silhouette.outline[sample]) as usize];
         let at = projected[point_idx as usize];
-        let target = silhouette.foot(sample, at, matching.hole_tolerance);
+        let target = silhouette.toward(sample, at, matching.hole_tolerance);
         let weight = of_pixel * Silhouette::OUTLINE_WEIGHT;
         SilhouettePair { point_idx, target, weight, tolerance: coverage }
     };
@@ -120,7 +123,7 @@ pub fn silhouette_pairs(
         let at = projected[point_idx as usize];
         let target = match matching.to_outline {
             true => silhouette.nearest_inside(at),
-            false => silhouette.nearest_pixel(at),
+            false => silhouette.nearest_pixel(at).into(),
         };
         SilhouettePair { point_idx, target, weight: of_point, tolerance: containment }
     };
@@ -169,11 +172,14 @@ pub fn silhouette_distances(
         let columns = values.len() / pairs.len();
         Tensor::<2>::from_data(TensorData::new(values, [pairs.len(), columns]), &device)
     };
-    let targets = column(pairs.iter().flat_map(|pair| pair.target).collect());
+    let targets = column(pairs.iter().flat_map(|pair| pair.target.at).collect());
+    let tangents = column(pairs.iter().flat_map(|pair| pair.target.tangent).collect());
     let weights = column(pairs.iter().map(|pair| pair.weight).collect());
     let tolerances = column(pairs.iter().map(|pair| pair.tolerance).collect());
 
-    let squared = (pixels - targets).square().sum_dim(1); // [pairs, 1]
+    let offsets = pixels - targets; // [pairs, 2]
+    let along = (offsets.clone() * tangents.clone()).sum_dim(1); // [pairs, 1]
+    let squared = (offsets - tangents * along).square().sum_dim(1);
     // (d − τ)² = d² − τ (2 d − τ), whose derivative stays finite where τ = 0 and d = 0.
     let distances = (squared.clone() + tolerances.clone().equal_elem(0.0).float()).sqrt();
     let excess = squared - (distances * 2.0 - tolerances.clone()) * tolerances;

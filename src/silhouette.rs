@@ -69,28 +69,55 @@ impl Silhouette {
         }
     }
 
-    /// The location nearest to another within `reach` pixels along the outline's tangent at a sample.
+    /// What a location is measured to within `reach` pixels along the outline's tangent at a sample.
     ///
     /// Samples lie apart: what is off along the outline by less is none that anything should be pulled
     /// across.
-    pub fn foot(&self, sample: usize, location: [f32; 2], reach: f32) -> [f32; 2] {
+    pub fn toward(&self, sample: usize, location: [f32; 2], reach: f32) -> Target {
         let (at, tangent) = (self.outline[sample], self.tangents[sample]);
         let along: f32 = (0..2).map(|axis| (location[axis] - at[axis]) * tangent[axis]).sum();
-        [0, 1].map(|axis| at[axis] + along.clamp(-reach, reach) * tangent[axis])
+        if along.abs() <= reach {
+            return Target { at, tangent };
+        }
+        let end = reach.copysign(along);
+        Target::from([0, 1].map(|axis| at[axis] + end * tangent[axis]))
     }
 
     /// The location itself where it is inside, else the nearest of the outline.
     ///
     /// Beyond the frame, the coverage of its border goes on: nothing is known there.
-    pub fn nearest_inside(&self, location: [f32; 2]) -> [f32; 2] {
+    pub fn nearest_inside(&self, location: [f32; 2]) -> Target {
         let [coverage] = bilinear(&self.coverage, location);
         match &self.outline_search {
             Some(search) if coverage <= MASK_THRESHOLD => {
                 let sample = search.nearest_pixel(location) as usize;
-                self.foot(sample, location, 0.5 * self.lengths[sample])
+                self.toward(sample, location, 0.5 * self.lengths[sample])
             }
-            _ => location,
+            _ => location.into(),
         }
+    }
+}
+
+/// Where a projected point should be: at a location, or anywhere on a line through it.
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    pub at: [f32; 2],
+    /// Direction of the line, of unit length; zero where there is none.
+    pub tangent: [f32; 2],
+}
+
+impl From<[f32; 2]> for Target {
+    fn from(at: [f32; 2]) -> Self {
+        Self { at, tangent: [0.0; 2] }
+    }
+}
+
+impl Target {
+    /// From the target straight to a location, in pixels.
+    pub fn offset(&self, location: [f32; 2]) -> [f32; 2] {
+        let offset = [0, 1].map(|axis| location[axis] - self.at[axis]);
+        let along = offset[0] * self.tangent[0] + offset[1] * self.tangent[1];
+        [0, 1].map(|axis| offset[axis] - along * self.tangent[axis])
     }
 }
 
@@ -176,15 +203,15 @@ mod tests {
         for k in 0..200 {
             let (turn, radius) = (k as f32, 0.1 * k as f32);
             let at = [CENTER[0] + radius * turn.cos(), CENTER[1] + radius * turn.sin()];
-            let [u, v] = disc.nearest_inside(at);
-            let moved = (u - at[0]).hypot(v - at[1]);
+            let [u, v] = disc.nearest_inside(at).offset(at);
+            let moved = u.hypot(v);
             assert!((moved - (radius - RADIUS).max(0.0)).abs() < 0.15, "{at:?} moved by {moved}");
         }
     }
 
     /// From a location that is 0.4 px inside of a sample and 0.3 px beside it.
     #[test]
-    fn a_foot_lies_straight_across_the_outline_within_its_reach() {
+    fn distances_are_taken_across_the_outline_within_reach() {
         let disc = disc();
         let pieces =
             disc.outline.iter().enumerate().filter(|(sample, _)| disc.lengths[*sample] > 0.1);
@@ -193,8 +220,8 @@ mod tests {
             let along = [-out[1], out[0]];
             let location = [0, 1].map(|axis| at[axis] - 0.4 * out[axis] + 0.3 * along[axis]);
             let distance = |reach: f32| {
-                let foot = disc.foot(sample, location, reach);
-                (foot[0] - location[0]).hypot(foot[1] - location[1])
+                let [u, v] = disc.toward(sample, location, reach).offset(location);
+                u.hypot(v)
             };
             // Marching squares turn by some degrees from one pixel to the next.
             assert!((distance(1.0) - 0.4).abs() < 0.12, "{location:?}: {}", distance(1.0));
@@ -206,11 +233,11 @@ mod tests {
     fn an_object_cut_by_the_frame_goes_on_beyond_it() {
         let mask = ScalarImage::from_fn(8, 6, |u, _| Luma([if u < 4 { 1.0 } else { 0.0 }]));
         let half = Silhouette::new(&mask).expect("half a frame");
-        assert_eq!(half.nearest_inside([-3.0, 2.0]), [-3.0, 2.0]);
-        assert_eq!(half.nearest_inside([6.0, 2.6])[0], 4.0);
+        assert_eq!(half.nearest_inside([-3.0, 2.0]).offset([-3.0, 2.0]), [0.0; 2]);
+        assert_eq!(half.nearest_inside([6.0, 2.6]).offset([6.0, 2.6]), [2.0, 0.0]);
         let full = Silhouette::new(&ScalarImage::from_pixel(4, 4, Luma([1.0]))).expect("full");
         assert!(full.outline.is_empty());
-        assert_eq!(full.nearest_inside([9.0, 9.0]), [9.0, 9.0]);
+        assert_eq!(full.nearest_inside([9.0, 9.0]).at, [9.0, 9.0]);
     }
 
     #[test]

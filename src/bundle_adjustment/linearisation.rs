@@ -109,7 +109,7 @@ impl Linearisation<'_> {
         let loss = self.config.silhouette_loss();
         for pair in pairs.iter().step_by(stride) {
             let at = self.matches.pixels[frame][pair.point_idx as usize];
-            let offset = [0, 1].map(|axis| f64::from(at[axis] - pair.target[axis]));
+            let offset = pair.target.offset(at).map(f64::from);
             let distance = offset[0].hypot(offset[1]);
             let excess = distance - f64::from(pair.tolerance);
             let robust = loss.weight(excess * excess);

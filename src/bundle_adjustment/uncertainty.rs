@@ -184,8 +184,8 @@ mod tests {
     use super::*;
     use crate::{
         bundle_adjustment::{
-            BundleAdjustmentConfig, bundle_adjust, observations::Observations,
-            shape_model::KnownPoints, unknowns::Parameterisation,
+            BundleAdjustmentConfig, bundle_adjust, objective::ObjectiveConfig,
+            observations::Observations, shape_model::KnownPoints, unknowns::Parameterisation,
         },
         data::{
             procedural,
@@ -239,6 +239,8 @@ mod tests {
         let lm = LevenbergMarquardtConfig { iterations: 40, ..Default::default() };
         let config = BundleAdjustmentConfig {
             blurs: vec![1.0],
+            // Tolerances are kinks, which weigh as much as silhouettes do.
+            objective: ObjectiveConfig { silhouette_weight: 40.0, ..Default::default() },
             lm: LevenbergMarquardtConfig { relative_tolerance: 1e-7, ..lm.clone() },
             ..Default::default()
         };
@@ -266,7 +268,7 @@ mod tests {
         });
         let nats: Vec<f64> = nats.collect();
         println!("{nats:.2?}");
-        assert!(nats.iter().all(|nats| (0.3..0.8).contains(nats)), "{nats:?}");
+        assert!(nats.iter().all(|nats| (0.25..0.8).contains(nats)), "{nats:?}");
     }
 
     #[test]
