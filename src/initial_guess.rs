@@ -73,7 +73,7 @@ impl InitialGuess {
         let (mask, intrinsics) = (&frame.mask, &sequence.intrinsics);
         let crop = CropCamera::around_silhouette(mask, MASK_THRESHOLD, intrinsics, size, margin)?;
         let (color, mask) = crop.warp(&frame.color, &frame.mask);
-        let guess = prior.regressors.regress(&color, &mask, &crop);
+        let guess = prior.regressors.regress(&color, &mask, &crop, prior.config.looks());
         let to_camera = |(pose, confidence)| (crop.camera_from_world(&pose), confidence);
         let poses = guess.poses.into_iter().map(to_camera).collect();
         Some(Self { style: guess.style, poses })
