@@ -20,7 +20,7 @@ use crate::{
 
 /// Share of the likeliest pose's confidence, tempered as the config has it, that another needs to be tried:
 /// front and back look alike coarsely.
-const LEAST_CONFIDENCE: f32 = 0.2;
+const LEAST_CONFIDENCE: f32 = 0.05;
 /// Turn from one frame to the next, in radians, beyond which a regressed pose is not believed.
 const LARGEST_TURN: f32 = 0.5;
 
@@ -43,6 +43,17 @@ pub enum InitialMotion {
     /// At the reference pose, Δp_l = 0, as in the paper.
     Still,
     /// At the regressed pose that is nearest to that of the frame before.
+    #[default]
+    Regressed,
+}
+
+/// Which style is likely before frames are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LikelyStyle {
+    /// That of the mean shape, zero.
+    Mean,
+    /// What the regressor makes of the reference frame: the mean of the shapes that look like it.
     #[default]
     Regressed,
 }
@@ -103,7 +114,14 @@ impl InitialGuess {
                 Unknowns::with_poses(&followed(pose, &guesses[1..]), &style, parameterisation)
             }
         };
-        let hypothesis = |(pose, confidence)| Hypothesis { unknowns: unknowns(pose), confidence };
+        let likely = match config.likely_style {
+            LikelyStyle::Mean => vec![0.0; style.len()],
+            LikelyStyle::Regressed => style.iter().map(|&s| f64::from(s)).collect(),
+        };
+        let hypothesis = |(pose, confidence)| Hypothesis {
+            unknowns: unknowns(pose).expecting(likely.clone()),
+            confidence,
+        };
         reference.likely_poses(config.confidence_exponent).map(hypothesis).collect()
     }
 
@@ -191,13 +209,13 @@ mod tests {
 
     #[test]
     fn only_poses_that_are_likely_enough_are_tried() {
-        let poses = [0.6, 0.2, 0.1].map(|confidence| (Isometry3::identity(), confidence));
+        let poses = [0.8, 0.05, 0.02].map(|confidence| (Isometry3::identity(), confidence));
         let guess = InitialGuess { style: vec![0.0; 3], poses: poses.to_vec() };
         assert_eq!(guess.likely_poses(1.0).count(), 2);
-        // Of the square root, a tenth is a third.
+        // Of their square roots, the last is a sixth of the first.
         let tempered: Vec<f32> =
             guess.likely_poses(0.5).map(|(_, confidence)| confidence).collect();
-        assert_eq!(tempered, [0.6f32, 0.2, 0.1].map(f32::sqrt));
+        assert_eq!(tempered, [0.8f32, 0.05, 0.02].map(f32::sqrt));
     }
 
     #[test]

@@ -32,7 +32,10 @@ pub fn reconstruct(
         Start::Regressors => InitialGuess::hypotheses(prior, sequence, config),
         Start::Truth => {
             let unknowns = true_unknowns(prior, sequence, config.objective.parameterisation);
-            unknowns.map(Hypothesis::from).into_iter().collect()
+            let regressed = InitialGuess::hypotheses(prior, sequence, config);
+            let likely = regressed.first().map(|guess| guess.unknowns.likely_style().to_vec());
+            let start = unknowns.zip(likely).map(|(truth, likely)| truth.expecting(likely));
+            start.map(Hypothesis::from).into_iter().collect()
         }
     };
     if hypotheses.is_empty() {

@@ -137,7 +137,9 @@ pub(super) fn leave_manifold(
 
     let (leading, others) = style.split_at(moved.n_leading);
     let vector = [leading, &vec![0.0; moved.n_modes()], others].concat();
-    *unknowns = unknowns.with_style(&vector);
+    let (leading, others) = unknowns.likely_style().split_at(moved.n_leading);
+    let likely = [leading, &vec![0.0; moved.n_modes()], others].concat();
+    *unknowns = unknowns.with_style(&vector).expecting(likely);
     // The weight is of a mean: that of each direction stays.
     let longer = vector.len() as f32 / style.len().max(1) as f32;
     let style_weight = longer * objective.config.style_weight;

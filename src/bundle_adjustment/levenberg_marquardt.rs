@@ -157,8 +157,8 @@ pub(super) fn normal_equations(
         max_residuals: config.max_residuals,
     };
     let mut model = linearisation.normal_equations();
-    let style = &unknowns.values[unknowns.style()];
-    model.add_style_prior(objective.config.style_weight, style, shape.n_directions());
+    let style = unknowns.unlikely_style();
+    model.add_style_prior(objective.config.style_weight, &style, shape.n_directions());
     model
 }
 
@@ -202,7 +202,8 @@ mod tests {
         };
         let start = sequence.truth.expect("rendered").camera_from_world[0];
         let style = [0.3, -0.2, 0.5, 0.1, 0.0, -0.4];
-        let mut unknowns = Unknowns::new(start, 3, &style, Parameterisation::ObjectCentred);
+        let mut unknowns = Unknowns::new(start, 3, &style, Parameterisation::ObjectCentred)
+            .expecting(vec![0.4, 0.1, -0.2, 0.0, 0.3, 0.1]);
         if config.refine_focal {
             unknowns = unknowns.with_focal();
             let focal = unknowns.focal();

@@ -52,7 +52,7 @@ pub use self::{
 };
 use crate::{
     data::sequence::Sequence,
-    initial_guess::{InitialMotion, InitialStyle, Start},
+    initial_guess::{InitialMotion, InitialStyle, LikelyStyle, Start},
 };
 
 /// Levels of blur after which hypotheses are not compared yet: coarsely, a car turned round fits as well.
@@ -97,6 +97,8 @@ pub struct BundleAdjustmentConfig {
     pub drop_margin: f64,
     pub start: Start,
     pub initial_style: InitialStyle,
+    /// s̄, around which the prior holds the style.
+    pub likely_style: LikelyStyle,
     pub initial_motion: InitialMotion,
     pub objective: ObjectiveConfig,
     pub displacement: DisplacementConfig,
@@ -113,10 +115,11 @@ impl Default for BundleAdjustmentConfig {
             blurs: vec![3.0, 1.5, 0.7, 0.0],
             n_hypotheses: 2,
             independent_observations: 20.0,
-            confidence_exponent: 1.0,
+            confidence_exponent: 0.5,
             drop_margin: 5.0,
             start: Start::default(),
             initial_style: InitialStyle::default(),
+            likely_style: LikelyStyle::default(),
             initial_motion: InitialMotion::default(),
             objective: ObjectiveConfig::default(),
             displacement: DisplacementConfig::default(),

@@ -1,6 +1,6 @@
 //! L = L_ph + λ L_CD (Eq. 6), with what later work added to make it well behaved.
 
-use burn::tensor::{Device, Tensor, s};
+use burn::tensor::{Device, Tensor, TensorData, s};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -76,7 +76,7 @@ pub struct ObjectiveConfig {
     /// Let hidden points count in the silhouette, too: they lie inside it as well, and close the
     /// gaps between the visible ones.
     pub silhouette_of_hidden_points: bool,
-    /// Weight of the mean squared style: the whitened style is a unit Gaussian.
+    /// Weight of the mean squared difference between the style and the likely one, in standard deviations.
     pub style_weight: f32,
     pub pseudo_render: PseudoRenderConfig,
 }
@@ -207,7 +207,9 @@ impl Objective<'_> {
         let mut objective = terms.photometric * self.config.photometric_weight
             + terms.silhouette * self.config.silhouette_weight;
         if self.config.style_weight > 0.0 && !unknowns.style().is_empty() {
-            let deviation = leaves.style.clone().square().mean();
+            let likely = TensorData::new(unknowns.likely_style().to_vec(), leaves.style.dims());
+            let likely = Tensor::from_data(likely, &leaves.style.device().inner());
+            let deviation = (leaves.style.clone() - likely).square().mean();
             objective = objective + deviation * self.config.style_weight;
         }
         let values = [scalar(&objective), photometric, silhouette];

@@ -31,6 +31,8 @@ pub struct Unknowns {
     refines_focal: bool,
     initial_reference: Isometry3<f32>,
     parameterisation: Parameterisation,
+    /// s̄, around which styles are likely.
+    likely_style: Vec<f64>,
 }
 
 /// The unknowns as leaves of the graph.
@@ -58,6 +60,7 @@ impl Unknowns {
             refines_focal: false,
             initial_reference: reference_pose,
             parameterisation,
+            likely_style: vec![0.0; style.len()],
         }
     }
 
@@ -92,12 +95,33 @@ impl Unknowns {
         self
     }
 
-    /// The same poses, and another style.
+    /// The same poses, and another style: around zero, if it is longer or shorter.
     pub fn with_style(&self, style: &[f32]) -> Self {
         let mut unknowns = self.clone();
         unknowns.values.truncate(self.style().start);
         unknowns.values.extend(style.iter().map(|&s| f64::from(s)));
+        if self.likely_style.len() != style.len() {
+            unknowns.likely_style = vec![0.0; style.len()];
+        }
         unknowns
+    }
+
+    /// The same, taking styles to be likely around this one instead of around the mean shape's, zero.
+    pub fn expecting(mut self, likely_style: Vec<f64>) -> Self {
+        assert_eq!(likely_style.len(), self.style().len(), "numbers in a style");
+        self.likely_style = likely_style;
+        self
+    }
+
+    /// s̄, around which styles are likely.
+    pub fn likely_style(&self) -> &[f64] {
+        &self.likely_style
+    }
+
+    /// s − s̄.
+    pub(super) fn unlikely_style(&self) -> Vec<f64> {
+        let style = &self.values[self.style()];
+        style.iter().zip(&self.likely_style).map(|(style, likely)| style - likely).collect()
     }
 
     /// Where p_0 lies in `values`.
