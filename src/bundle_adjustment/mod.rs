@@ -14,6 +14,7 @@ pub mod levenberg_marquardt;
 mod linearisation;
 mod normal_equations;
 pub mod objective;
+mod objective_config;
 pub mod observations;
 mod photometric;
 mod progress;
