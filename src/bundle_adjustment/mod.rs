@@ -215,6 +215,51 @@ pub fn bundle_adjust(
     };
     let mut progress =
         Progress { observe, stages: Vec::new(), iteration: 0, hypothesis: 0, blur: 0.0 };
+    let runs = explored(&objective, hypotheses, config, &mut progress);
+    let hypotheses = runs.iter().map(|run| run.report.clone()).collect();
+    let (idx, best) = best_of(runs);
+    let Run { mut unknowns, mut stages, report, .. } = best;
+    let (last_level, mut status) = (config.blurs.len() - 1, report.status);
+    let mut displacement = None;
+    if config.leaves_manifold() && !status.is_fault() {
+        progress.hypothesis = idx;
+        std::mem::swap(&mut progress.stages, &mut stages);
+        let configs = (&config.displacement, &config.lm);
+        let (moved, ending) =
+            leave_manifold(&objective, &mut unknowns, last_level, configs, &mut progress);
+        std::mem::swap(&mut progress.stages, &mut stages);
+        status = ending.status;
+        displacement = Some(moved);
+    }
+    let shape = Displaced { prior: shape, displacement: displacement.as_ref() };
+    let objective = Objective { shape: &shape, device: device.clone(), ..objective };
+    let certain = || {
+        let n_directions =
+            displacement.as_ref().map_or(config.lm.n_directions, Displacement::n_solved);
+        let lm = LevenbergMarquardtConfig { n_directions, ..config.lm.clone() };
+        uncertainty(&objective, &unknowns, last_level, &lm, config.independent_observations)
+    };
+    let known = config.solver == Solver::Lm && !status.is_fault();
+    let exposures = || objective.value(&unknowns, last_level).1.exposures;
+    Outcome {
+        exposures: config.objective.solve_exposure.then(exposures),
+        uncertainty: known.then(certain).flatten(),
+        unknowns,
+        displacement,
+        status,
+        iterations: progress.iteration,
+        stages,
+        hypotheses,
+    }
+}
+
+/// Runs the solver from every initial guess, level by level, and gives up on those that fall behind.
+fn explored(
+    objective: &Objective,
+    hypotheses: &[Hypothesis],
+    config: &BundleAdjustmentConfig,
+    progress: &mut Progress,
+) -> Vec<Run> {
     let mut hypotheses = hypotheses[..hypotheses.len().min(config.n_hypotheses.max(1))].to_vec();
     if config.objective.refine_focal {
         hypotheses
@@ -227,52 +272,23 @@ pub fn bundle_adjust(
     for level in 0..=last_level {
         for (idx, run) in runs.iter_mut().enumerate().filter(|(_, run)| run.goes_on()) {
             progress.hypothesis = idx;
-            run.advance(&objective, level, config, &mut progress);
+            run.advance(objective, level, config, progress);
         }
         if COARSE_LEVELS <= level && level < last_level {
             drop_those_behind(&mut runs, config.drop_margin);
         }
     }
-    let reports = runs.iter().map(|run| run.report.clone()).collect();
-    // A run that was dropped has seen coarser frames only: what it ended with does not compare.
-    let best =
-        runs.into_iter().filter(|run| run.report.status != Status::Dropped).min_by(|a, b| {
-            let ([a_faulty, b_faulty], [a, b]) =
-                ([a.rank().0, b.rank().0], [a.rank().1, b.rank().1]);
-            a_faulty.cmp(&b_faulty).then(a.total_cmp(&b))
-        });
-    let Run { mut unknowns, mut stages, mut report, .. } = best.expect("the best is never dropped");
-    let mut displacement = None;
-    if config.leaves_manifold() && !report.status.is_fault() {
-        std::mem::swap(&mut progress.stages, &mut stages);
-        let configs = (&config.displacement, &config.lm);
-        let (moved, ending) =
-            leave_manifold(&objective, &mut unknowns, last_level, configs, &mut progress);
-        std::mem::swap(&mut progress.stages, &mut stages);
-        report.status = ending.status;
-        displacement = Some(moved);
-    }
-    let shape = Displaced { prior: shape, displacement: displacement.as_ref() };
-    let objective = Objective { shape: &shape, device: device.clone(), ..objective };
-    let certain = || {
-        let n_observations = config.independent_observations;
-        let n_directions =
-            displacement.as_ref().map_or(config.lm.n_directions, Displacement::n_solved);
-        let lm = LevenbergMarquardtConfig { n_directions, ..config.lm.clone() };
-        uncertainty(&objective, &unknowns, last_level, &lm, n_observations)
-    };
-    let known = config.solver == Solver::Lm && !report.status.is_fault();
-    let exposures = || objective.value(&unknowns, last_level).1.exposures;
-    let exposures = config.objective.solve_exposure.then(exposures);
-    let uncertainty = known.then(certain).flatten();
-    Outcome {
-        exposures,
-        uncertainty,
-        unknowns,
-        displacement,
-        status: report.status,
-        iterations: progress.iteration,
-        stages,
-        hypotheses: reports,
-    }
+    runs
+}
+
+/// The run to keep, and its place. One that was dropped has seen coarser frames only: what it ended with
+/// does not compare.
+fn best_of(runs: Vec<Run>) -> (usize, Run) {
+    let finished =
+        runs.into_iter().enumerate().filter(|(_, run)| run.report.status != Status::Dropped);
+    let best = finished.min_by(|(_, a), (_, b)| {
+        let ([a_faulty, b_faulty], [a, b]) = ([a.rank().0, b.rank().0], [a.rank().1, b.rank().1]);
+        a_faulty.cmp(&b_faulty).then(a.total_cmp(&b))
+    });
+    best.expect("the best is never dropped")
 }
