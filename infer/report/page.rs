@@ -134,7 +134,7 @@ fn frame_data(frame: &Frame, [width, height]: [usize; 2]) -> Result<FrameData> {
 }
 
 fn sigmas(points: &[f64]) -> Sigmas {
-    let most = points.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let most = points.iter().copied().filter(|s| s.is_finite()).fold(f64::MIN_POSITIVE, f64::max);
     Sigmas { most, values: encode::shares(points.iter().map(|sigma| (sigma / most) as f32)) }
 }
 

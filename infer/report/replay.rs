@@ -41,6 +41,8 @@ pub struct Snapshot {
 pub struct ChartStep {
     #[serde(flatten)]
     pub step: Step,
+    /// How many steps of its hypothesis came before.
+    pub ordinal: usize,
     /// Mean over frames, in degrees; of relative rotations where the true world is not canonical.
     pub pose_error: Option<f64>,
 }
@@ -65,17 +67,21 @@ impl Replay {
         let Reconstruction { history, trace, outcome, .. } = reconstruction;
         let kept = kept_hypothesis(history, trace, &outcome.unknowns, device);
         let n_hypotheses = history.iter().map(|step| step.hypothesis + 1).max().unwrap_or(0);
-        let steps: Vec<Vec<usize>> = (0..n_hypotheses)
+        // Of each hypothesis, the steps that are charted: an ordinal, and where it is in the history.
+        let steps: Vec<Vec<(usize, usize)>> = (0..n_hypotheses)
             .map(|hypothesis| {
                 let of_it: Vec<usize> =
                     (0..history.len()).filter(|&i| history[i].hypothesis == hypothesis).collect();
-                spread(of_it.len(), MOST_STEPS).into_iter().map(|i| of_it[i]).collect()
+                spread(of_it.len(), MOST_STEPS).into_iter().map(|i| (i, of_it[i])).collect()
             })
             .collect();
 
         let generator = &prior.shape.generator;
         let shown = spread(steps.get(kept).map_or(0, Vec::len), MOST_SNAPSHOTS);
-        let states: Vec<&Unknowns> = shown.iter().map(|&i| &trace[steps[kept][i]]).collect();
+        let mut states: Vec<&Unknowns> = shown.iter().map(|&i| &trace[steps[kept][i].1]).collect();
+        if let Some(last) = states.last_mut() {
+            *last = &outcome.unknowns;
+        }
         let clouds: Vec<Vec<[f32; 3]>> =
             states.iter().map(|state| host_points(&points(generator, state, device))).collect();
         let bounds = encode::bounds(clouds.iter().map(Vec::as_slice));
@@ -91,8 +97,9 @@ impl Replay {
             }
         });
         let snapshots = snapshots.collect();
-        let judged = |&i: &usize| ChartStep {
+        let judged = |&(ordinal, i): &(usize, usize)| ChartStep {
             step: history[i].clone(),
+            ordinal,
             pose_error: pose_error(sequence, &trace[i].camera_from_world(device)),
         };
         let hypotheses = steps.iter().map(|steps| steps.iter().map(judged).collect()).collect();
@@ -147,7 +154,35 @@ fn spread(n: usize, most: usize) -> Vec<usize> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+    use object_pba::{bundle_adjustment::unknowns::Parameterisation, device::Backend};
+
     use super::*;
+
+    /// Both hypotheses have not moved at all: their unknowns are equal, their poses are not.
+    #[test]
+    fn the_kept_hypothesis_is_known_by_its_poses() {
+        let starts = [0.0, 180.0f32].map(|degrees| {
+            let turn = Isometry3::rotation(Vector3::y() * degrees.to_radians());
+            Unknowns::new(turn, 2, &[], Parameterisation::default())
+        });
+        let step = |hypothesis| Step {
+            iteration: 0,
+            hypothesis,
+            blur: 0.0,
+            block: "joint".into(),
+            objective: 1.0,
+            photometric: 1.0,
+            silhouette: 1.0,
+            n_visible: 1,
+        };
+        let history = [step(0), step(1), step(0)];
+        let trace = [0, 1, 0].map(|hypothesis| starts[hypothesis].clone());
+        let device = Backend::default().device();
+        for (hypothesis, found) in starts.iter().enumerate() {
+            assert_eq!(kept_hypothesis(&history, &trace, found, &device), hypothesis);
+        }
+    }
 
     #[test]
     fn what_is_spread_begins_and_ends_with_the_whole_and_skips_evenly() {

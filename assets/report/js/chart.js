@@ -42,9 +42,8 @@ class LossChart {
     this.plot?.destroy();
     const { hypotheses, kept } = this.report;
     const { label, log } = CHARTED[quantity];
-    const length = Math.max(...hypotheses.map((steps) => steps.length));
-    const value = (step) => (step == null || (log && !(step[quantity] > 0)) ? null : step[quantity]);
-    const columns = hypotheses.map((steps) => Array.from({ length }, (_, i) => value(steps[i]) ?? null));
+    const value = (step) => (log && !(step[quantity] > 0) ? null : step[quantity]);
+    const tables = hypotheses.map((steps) => [steps.map(({ ordinal }) => ordinal), steps.map(value)]);
     const axis = { stroke: theme.muted, grid: { stroke: theme.line, width: 1 }, ticks: { show: false } };
     const values = (_, ticks) => ticks.map((tick) => (tick == null ? '' : brief(tick)));
     const series = hypotheses.map((_, i) => ({
@@ -53,6 +52,7 @@ class LossChart {
       width: i === kept ? 2 : 1.25,
       dash: i === kept ? undefined : [5, 4],
       points: { show: false },
+      spanGaps: true,
       value: (_, v) => brief(v),
     }));
     const options = {
@@ -64,12 +64,15 @@ class LossChart {
       cursor: { drag: { x: false, y: false } },
       hooks: { draw: [(plot) => this.mark(plot)] },
     };
-    this.plot = new uPlot(options, [Array.from({ length }, (_, i) => i), ...columns], this.element);
+    this.plot = new uPlot(options, uPlot.join(tables), this.element);
+    const { canvas } = this.plot.ctx;
+    canvas.setAttribute('role', 'img');
+    canvas.setAttribute('aria-label', `${label} over the steps of the optimisation`);
   }
 
   /** Where the replay stands. */
-  showStep(step) {
-    this.step = step;
+  showStep(ordinal) {
+    this.step = ordinal;
     this.plot?.redraw(false);
   }
 
@@ -82,9 +85,9 @@ class LossChart {
     ctx.font = `${11 * ratio}px system-ui`;
     Object.assign(ctx, { fillStyle: this.theme.muted, textAlign: 'left', textBaseline: 'alphabetic' });
     let free = bbox.left;
-    steps.forEach(({ blur }, i) => {
+    steps.forEach(({ blur, ordinal }, i) => {
       if (i > 0 && blur === steps[i - 1].blur) return;
-      const x = i === 0 ? bbox.left : plot.valToPos(i - 0.5, 'x', true);
+      const x = i === 0 ? bbox.left : plot.valToPos(ordinal - 0.5, 'x', true);
       if (i > 0) this.line(ctx, bbox, x, this.theme.muted, 1, [2, 4]);
       const text = blur > 0 ? `blur ${brief(blur)} px` : 'sharp';
       if (x < free) return;

@@ -105,7 +105,7 @@ async function main() {
     scene?.show(player.snapshot, animate);
     colorCloud();
     drawFrame();
-    chart.showStep(player.snapshot.step);
+    chart.showStep(player.ordinalOf(player.snapshot));
   });
   const chart = new LossChart(document.getElementById('chart'), report, (step) => player.seekStep(step));
 
@@ -116,6 +116,7 @@ async function main() {
   fillStrip(document.getElementById('strip'), report.frames, (frame) => {
     Object.assign(state, { frame });
     scene?.selectFrame(frame);
+    if (scene?.viewpoint === 'frame') lookFrom(scene, 'frame', player.snapshot);
     drawFrame();
   });
   const applyTheme = () => {

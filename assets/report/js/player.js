@@ -29,9 +29,9 @@ class Player {
     this.slider.value = this.idx;
     const { step } = this.snapshot;
     const steps = this.report.hypotheses[this.report.kept];
-    const { blur, block, poseError } = steps[step];
+    const { ordinal, blur, block, poseError } = steps[step];
     const sharpness = blur > 0 ? `blur ${brief(blur)} px` : 'sharp frames';
-    const parts = [`Step ${step} of ${steps.length - 1}`, sharpness];
+    const parts = [`Step ${ordinal} of ${steps.at(-1).ordinal}`, sharpness];
     if (block !== 'joint') parts.push(block);
     if (poseError != null) parts.push(`pose error ${poseError.toFixed(2)}°`);
     document.getElementById('now').replaceChildren(...parts.map((part) => element('span', '', part)));
@@ -40,10 +40,15 @@ class Player {
     this.show(this.idx, animate);
   }
 
-  /** Goes to the snapshot that is nearest to a step of the chart. */
-  seekStep(step) {
+  /** The shown snapshot's place among the steps of its hypothesis. */
+  ordinalOf({ step }) {
+    return this.report.hypotheses[this.report.kept][step].ordinal;
+  }
+
+  /** Goes to the snapshot that is nearest to a place in the chart. */
+  seekStep(ordinal) {
     this.pause();
-    const distances = this.report.snapshots.map((snapshot) => Math.abs(snapshot.step - step));
+    const distances = this.report.snapshots.map((snapshot) => Math.abs(this.ordinalOf(snapshot) - ordinal));
     this.seek(distances.indexOf(Math.min(...distances)));
   }
 

@@ -41,6 +41,7 @@ class Scene3D {
     this.controls = new THREE.OrbitControls(this.camera, canvas);
     Object.assign(this.controls, { minDistance: 0.2, maxDistance: 30, enableDamping: true });
     this.controls.addEventListener('change', () => this.requestRender());
+    this.controls.addEventListener('start', () => (this.viewpoint = null));
 
     const first = report.snapshots[0];
     this.cloud = this.addPoints(first.cloud.length, 1);

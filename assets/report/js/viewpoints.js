@@ -7,7 +7,7 @@ const VIEWPOINTS = {
     const center = new THREE.Vector3(...cameraCenter(middle)).normalize();
     const azimuth = Math.atan2(center.x, center.z);
     const elevation = Math.min(Math.max(Math.asin(center.y), 0.2), 0.6);
-    const distance = 1.6 * widening(scene);
+    const distance = 1.5 * widening(scene);
     return { position: spherical(azimuth, elevation, distance), target: [0, -0.05, 0] };
   },
 
@@ -45,7 +45,9 @@ function spherical(azimuth, elevation, distance) {
   return [horizontal * Math.sin(azimuth), distance * Math.sin(elevation), horizontal * Math.cos(azimuth)];
 }
 
+/** Looks from there until the reader turns the view. */
 function lookFrom(scene, viewpoint, snapshot) {
+  scene.viewpoint = viewpoint;
   const { position, target, fov = FIELD_OF_VIEW } = VIEWPOINTS[viewpoint](scene, snapshot);
   scene.camera.position.set(...position);
   scene.controls.target.set(...target);
@@ -68,6 +70,7 @@ function turnByKeys(scene) {
   canvas.addEventListener('keydown', (event) => {
     if (!turns[event.key] || event.ctrlKey || event.metaKey) return;
     event.preventDefault();
+    scene.viewpoint = null;
     turns[event.key]();
     scene.requestRender();
   });
