@@ -113,7 +113,6 @@ fn it_opens_from_disk_without_a_request_or_an_error() {
     let requests = "return performance.getEntriesByType('resource').map(entry => entry.name)
         .filter(name => !name.startsWith('data:'))";
     assert_eq!(browser.run(requests), json!([]));
-    assert!(ready_after(&browser).as_str().unwrap().parse::<f64>().unwrap() < 10_000.0);
     assert_eq!(browser.text("h1"), "a <b>car");
     for layer in ["residual", "none"] {
         browser.click(&format!("input[name=layer][value={layer}]"));
@@ -151,6 +150,8 @@ fn the_scrubber_goes_through_the_optimisation() {
     assert!(last >= 3, "{last} steps");
     let selectors = ["#view", "#frame", "#chart", "#now"];
     browser.click("input[name=layer][value=residual]");
+    // These colours are the same at every step: what changes is where the points are.
+    browser.click("input[value=uncertainty]");
     for selector in selectors {
         browser.press("#scrubber", keys::END);
         check_changes(&browser, selector, || browser.press("#scrubber", keys::HOME));

@@ -4,7 +4,7 @@ const CHARTED = {
   objective: { label: 'Objective', log: true },
   photometric: { label: 'Photometric term', log: true },
   silhouette: { label: 'Silhouette term', log: true },
-  poseError: { label: 'Pose error (deg)', log: false },
+  poseError: { label: 'Error of the poses (deg)', log: false },
 };
 
 /** Significant digits that tell values apart, and no more. */
@@ -59,7 +59,7 @@ class LossChart {
       width: Math.max(this.element.clientWidth, 200),
       height: this.height(),
       scales: { x: { time: false }, y: log ? { distr: 3 } : { range: (_, least, most) => [0, most * 1.08 || 1] } },
-      axes: [axis, { ...axis, size: 58, values }],
+      axes: [{ ...axis, incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000] }, { ...axis, size: 58, values }],
       series: [{ label: 'Step' }, ...series],
       cursor: { drag: { x: false, y: false } },
       hooks: { draw: [(plot) => this.mark(plot)] },

@@ -7,6 +7,8 @@ class Player {
   /** `show(idx, animate)` puts a snapshot on the page. */
   constructor(report, show) {
     Object.assign(this, { report, show, idx: report.snapshots.length - 1, timer: null });
+    // In a world of its own, the truth tells how frames lie to one another, and no more.
+    this.errorName = report.truth?.poses ? 'pose error' : 'relative error';
     this.slider = document.getElementById('scrubber');
     this.button = document.getElementById('play');
     this.slider.max = this.idx;
@@ -33,7 +35,7 @@ class Player {
     const sharpness = blur > 0 ? `blur ${brief(blur)} px` : 'sharp frames';
     const parts = [`Step ${ordinal} of ${steps.at(-1).ordinal}`, sharpness];
     if (block !== 'joint') parts.push(block);
-    if (poseError != null) parts.push(`pose error ${poseError.toFixed(2)}°`);
+    if (poseError != null) parts.push(`${this.errorName} ${poseError.toFixed(2)}°`);
     document.getElementById('now').replaceChildren(...parts.map((part) => element('span', '', part)));
     this.slider.setAttribute('aria-valuetext', parts.join(', '));
     document.documentElement.dataset.snapshot = this.idx;

@@ -16,9 +16,9 @@ const VIEWPOINTS = {
     const centers = snapshot.poses.map((pose) => new THREE.Vector3(...cameraCenter(pose)));
     const middle = centers.reduce((sum, c) => sum.add(c), new THREE.Vector3()).divideScalar(centers.length);
     const azimuth = Math.atan2(middle.x, middle.z) + 1.15;
-    const halfWidth = 0.5 * middle.length() + 0.45;
+    const halfWidth = 0.46 * middle.length() + 0.35;
     const halfHeight = Math.max(0.5 * Math.abs(middle.y) + 0.35, halfWidth / scene.camera.aspect);
-    const distance = halfHeight / Math.tan((FIELD_OF_VIEW * Math.PI) / 360) + 0.3;
+    const distance = halfHeight / Math.tan((FIELD_OF_VIEW * Math.PI) / 360);
     const target = middle.multiplyScalar(0.5).toArray();
     const offset = spherical(azimuth, 0.35, distance);
     return { position: offset.map((x, i) => x + target[i]), target };
