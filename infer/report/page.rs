@@ -193,6 +193,7 @@ const SCRIPTS: &str = concat!(
     include_str!("../../assets/report/js/measure.js"),
     include_str!("../../assets/report/js/palette.js"),
     include_str!("../../assets/report/js/cameras.js"),
+    include_str!("../../assets/report/js/points.js"),
     include_str!("../../assets/report/js/scene.js"),
     include_str!("../../assets/report/js/viewpoints.js"),
     include_str!("../../assets/report/js/frame.js"),

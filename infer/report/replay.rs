@@ -66,37 +66,13 @@ impl Replay {
     ) -> Self {
         let Reconstruction { history, trace, outcome, .. } = reconstruction;
         let kept = kept_hypothesis(history, trace, &outcome.unknowns, device);
-        let n_hypotheses = history.iter().map(|step| step.hypothesis + 1).max().unwrap_or(0);
-        // Of each hypothesis, the steps that are charted: an ordinal, and where it is in the history.
-        let steps: Vec<Vec<(usize, usize)>> = (0..n_hypotheses)
-            .map(|hypothesis| {
-                let of_it: Vec<usize> =
-                    (0..history.len()).filter(|&i| history[i].hypothesis == hypothesis).collect();
-                spread(of_it.len(), MOST_STEPS).into_iter().map(|i| (i, of_it[i])).collect()
-            })
-            .collect();
-
-        let generator = &prior.shape.generator;
+        let steps = charted(history);
         let shown = spread(steps.get(kept).map_or(0, Vec::len), MOST_SNAPSHOTS);
         let mut states: Vec<&Unknowns> = shown.iter().map(|&i| &trace[steps[kept][i].1]).collect();
         if let Some(last) = states.last_mut() {
             *last = &outcome.unknowns;
         }
-        let clouds: Vec<Vec<[f32; 3]>> =
-            states.iter().map(|state| host_points(&points(generator, state, device))).collect();
-        let bounds = encode::bounds(clouds.iter().map(Vec::as_slice));
-        let snapshots = shown.iter().zip(&states).zip(&clouds).map(|((&step, state), cloud)| {
-            let Views { visible, .. } =
-                views(sequence, generator, state, &config.objective.pseudo_render, device);
-            Snapshot {
-                step,
-                cloud: encode::cloud(cloud, &bounds),
-                visible: visible.iter().map(|seen| encode::bits(seen, cloud.len())).collect(),
-                poses: state.camera_from_world(device).iter().map(rows).collect(),
-                focal: state.intrinsics(&sequence.intrinsics).focal,
-            }
-        });
-        let snapshots = snapshots.collect();
+        let (snapshots, bounds) = snapshots(prior, sequence, config, device, &shown, &states);
         let judged = |&(ordinal, i): &(usize, usize)| ChartStep {
             step: history[i].clone(),
             ordinal,
@@ -105,6 +81,47 @@ impl Replay {
         let hypotheses = steps.iter().map(|steps| steps.iter().map(judged).collect()).collect();
         Self { kept, hypotheses, snapshots, bounds }
     }
+}
+
+/// Of each hypothesis, the steps that are charted: an ordinal, and where it is in the history.
+fn charted(history: &[Step]) -> Vec<Vec<(usize, usize)>> {
+    let of = |hypothesis: usize| {
+        let of_it: Vec<usize> =
+            (0..history.len()).filter(|&i| history[i].hypothesis == hypothesis).collect();
+        spread(of_it.len(), MOST_STEPS).into_iter().map(|i| (i, of_it[i])).collect()
+    };
+    (0..n_hypotheses(history)).map(of).collect()
+}
+
+fn n_hypotheses(history: &[Step]) -> usize {
+    history.iter().map(|step| step.hypothesis + 1).max().unwrap_or(0)
+}
+
+/// States as the page has them, and the box in which their points are.
+fn snapshots(
+    prior: &Prior,
+    sequence: &Sequence,
+    config: &BundleAdjustmentConfig,
+    device: &Device,
+    steps: &[usize],
+    states: &[&Unknowns],
+) -> (Vec<Snapshot>, Bounds) {
+    let generator = &prior.shape.generator;
+    let clouds: Vec<Vec<[f32; 3]>> =
+        states.iter().map(|state| host_points(&points(generator, state, device))).collect();
+    let bounds = encode::bounds(clouds.iter().map(Vec::as_slice));
+    let snapshot = |((&step, state), cloud): ((&usize, &&Unknowns), &Vec<[f32; 3]>)| {
+        let Views { visible, .. } =
+            views(sequence, generator, state, &config.objective.pseudo_render, device);
+        Snapshot {
+            step,
+            cloud: encode::cloud(cloud, &bounds),
+            visible: visible.iter().map(|seen| encode::bits(seen, cloud.len())).collect(),
+            poses: state.camera_from_world(device).iter().map(rows).collect(),
+            focal: state.intrinsics(&sequence.intrinsics).focal,
+        }
+    };
+    (steps.iter().zip(states).zip(&clouds).map(snapshot).collect(), bounds)
 }
 
 /// A pose as three rows of four, [R | t].
@@ -130,9 +147,8 @@ fn kept_hypothesis(
         });
         apart.sum()
     };
-    let n_hypotheses = history.iter().map(|step| step.hypothesis + 1).max().unwrap_or(0);
     let last_of = |hypothesis: usize| history.iter().rposition(|s| s.hypothesis == hypothesis);
-    (0..n_hypotheses)
+    (0..n_hypotheses(history))
         .filter_map(|hypothesis| Some((distance(&trace[last_of(hypothesis)?]), hypothesis)))
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map_or(0, |(_, hypothesis)| hypothesis)

@@ -4,33 +4,6 @@
 const TRANSITION = 320;
 const FIELD_OF_VIEW = 35;
 
-const POINT_SHADERS = {
-  vertexShader: `
-    attribute vec4 color;
-    uniform float diameter;
-    uniform float pixelsPerUnit;
-    varying vec3 tint;
-    varying float depth;
-    void main() {
-      vec4 inCamera = modelViewMatrix * vec4(position, 1.0);
-      depth = -inCamera.z - length(modelViewMatrix[3].xyz);
-      tint = color.rgb;
-      gl_PointSize = max(diameter * pixelsPerUnit / -inCamera.z, 1.5);
-      // A surface that is seen hides points that lie behind it by less than the cloud tells.
-      inCamera.xyz *= 1.0 + (1.0 - color.a) * 1.5 * diameter / -inCamera.z;
-      gl_Position = projectionMatrix * inCamera;
-    }`,
-  fragmentShader: `
-    uniform float opacity;
-    varying vec3 tint;
-    varying float depth;
-    void main() {
-      vec2 fromCenter = gl_PointCoord - 0.5;
-      if (dot(fromCenter, fromCenter) > 0.25) discard;
-      gl_FragColor = vec4(tint * mix(1.0, 0.62, smoothstep(-0.4, 0.5, depth)), opacity);
-    }`,
-};
-
 class Scene3D {
   constructor(canvas, report) {
     this.canvas = canvas;
@@ -44,7 +17,8 @@ class Scene3D {
     this.controls.addEventListener('start', () => (this.viewpoint = null));
 
     const first = report.snapshots[0];
-    this.cloud = this.addPoints(first.cloud.length, 1);
+    this.cloud = makePoints(first.cloud.length, 1);
+    this.scene.add(this.cloud);
     this.cameras = this.addLines(frusta(first.poses, first.focal, report));
     this.selected = this.addLines(new Float32Array(FRUSTUM_VALUES));
     this.selected.renderOrder = 1;
@@ -55,22 +29,9 @@ class Scene3D {
     this.resize();
   }
 
-  /** As many points as hold `n_values` coordinates; each about as wide as their spacing. */
-  addPoints(nValues, opacity) {
-    const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(nValues), 3));
-    geometry.setAttribute('color', new THREE.BufferAttribute(new Uint8Array((nValues / 3) * 4).fill(255), 4, true));
-    const diameter = 2.3 / Math.sqrt(nValues / 3);
-    const uniforms = { diameter: { value: diameter }, pixelsPerUnit: { value: 1 }, opacity: { value: opacity } };
-    const material = new THREE.ShaderMaterial({ ...POINT_SHADERS, uniforms, transparent: opacity < 1 });
-    const points = new THREE.Points(geometry, material);
-    points.frustumCulled = false;
-    this.scene.add(points);
-    return points;
-  }
-
   addTrueCloud(values) {
-    this.trueCloud = this.addPoints(values.length, 0.55);
+    this.trueCloud = makePoints(values.length, 0.55);
+    this.scene.add(this.trueCloud);
     this.trueCloud.geometry.attributes.position.array.set(values);
     const { array } = this.trueCloud.geometry.attributes.color;
     for (let i = 0; i < array.length; i++) array[i] = i % 4 === 3 ? 255 : 128;
