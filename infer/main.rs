@@ -7,6 +7,7 @@ mod export;
 mod figures;
 mod input;
 mod output;
+mod report;
 mod run;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -44,6 +45,9 @@ enum Command {
         /// Folder for the pictures, the cloud and the cameras.
         #[arg(long, default_value = "runs/demo")]
         out: PathBuf,
+        /// Leave out report/index.html.
+        #[arg(long)]
+        no_report: bool,
         #[command(flatten)]
         options: Options,
     },
@@ -54,6 +58,9 @@ enum Command {
         /// Folder for the results.
         #[arg(long)]
         out: PathBuf,
+        /// Leave out report/index.html.
+        #[arg(long)]
+        no_report: bool,
         #[command(flatten)]
         input: Input,
         #[command(flatten)]
@@ -134,9 +141,9 @@ impl Options {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Demo { out, options } => run::demo(&out, &options),
-        Command::Run { sequence, out, input, options } => {
-            run::run(&sequence, &out, &input, &options)
+        Command::Demo { out, no_report, options } => run::demo(&out, !no_report, &options),
+        Command::Run { sequence, out, no_report, input, options } => {
+            run::run(&sequence, &out, !no_report, &input, &options)
         }
         Command::Evaluate { dataset, out, options } => evaluate::evaluate(&dataset, &out, &options),
         Command::Ablate { sequences, out, options } => ablate::ablate(&sequences, &out, &options),
