@@ -40,11 +40,12 @@ pub fn write(
         .with_context(|| format!("cannot write {}", path.display()))?;
 
     let device = backend.device();
-    let (generator, unknowns) = (&prior.shape.generator, &reconstruction.outcome.unknowns);
-    let views = views(sequence, generator, unknowns, &config.objective.pseudo_render, &device);
+    let outcome = &reconstruction.outcome;
+    let (shape, unknowns) = (outcome.shape(&prior.shape.generator), &outcome.unknowns);
+    let views = views(sequence, &shape, unknowns, &config.objective.pseudo_render, &device);
     let colors = figures::point_colors(sequence, &views);
     let colors: Vec<[u8; 3]> = colors.iter().map(|c| c.unwrap_or(figures::UNSEEN)).collect();
-    let cloud = host_points(&points(generator, unknowns, &device));
+    let cloud = host_points(&points(&shape, unknowns, &device));
     let reference = unknowns.camera_from_world(&device)[0];
     let picture = thumbnail::draw(&sequence.frames[0], &reference, &cloud, &colors);
     figures::save(&picture, &folder.join("thumb.png"))

@@ -3,7 +3,9 @@
 use burn::tensor::Device;
 use nalgebra::Isometry3;
 use object_pba::{
-    bundle_adjustment::{BundleAdjustmentConfig, Step, unknowns::Unknowns},
+    bundle_adjustment::{
+        BundleAdjustmentConfig, Step, shape_model::ShapeModel, unknowns::Unknowns,
+    },
     checkpoint::Prior,
     data::sequence::Sequence,
     host::host_points,
@@ -72,7 +74,8 @@ impl Replay {
         if let Some(last) = states.last_mut() {
             *last = &outcome.unknowns;
         }
-        let (snapshots, bounds) = snapshots(prior, sequence, config, device, &shown, &states);
+        let shape = outcome.shape(&prior.shape.generator);
+        let (snapshots, bounds) = snapshots(&shape, sequence, config, device, &shown, &states);
         let judged = |&(ordinal, i): &(usize, usize)| ChartStep {
             step: history[i].clone(),
             ordinal,
@@ -99,20 +102,19 @@ fn n_hypotheses(history: &[Step]) -> usize {
 
 /// States as the page has them, and the box in which their points are.
 fn snapshots(
-    prior: &Prior,
+    shape: &dyn ShapeModel,
     sequence: &Sequence,
     config: &BundleAdjustmentConfig,
     device: &Device,
     steps: &[usize],
     states: &[&Unknowns],
 ) -> (Vec<Snapshot>, Bounds) {
-    let generator = &prior.shape.generator;
     let clouds: Vec<Vec<[f32; 3]>> =
-        states.iter().map(|state| host_points(&points(generator, state, device))).collect();
+        states.iter().map(|state| host_points(&points(shape, state, device))).collect();
     let bounds = encode::bounds(clouds.iter().map(Vec::as_slice));
     let snapshot = |((&step, state), cloud): ((&usize, &&Unknowns), &Vec<[f32; 3]>)| {
         let Views { visible, .. } =
-            views(sequence, generator, state, &config.objective.pseudo_render, device);
+            views(sequence, shape, state, &config.objective.pseudo_render, device);
         Snapshot {
             step,
             cloud: encode::cloud(cloud, &bounds),
