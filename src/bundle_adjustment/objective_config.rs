@@ -94,7 +94,7 @@ impl Default for ObjectiveConfig {
             silhouette_trim: 0.0,
             silhouette_of_reference: true,
             silhouette_of_hidden_points: true,
-            style_weight: 0.2,
+            style_weight: 6.0,
             pseudo_render: PseudoRenderConfig::default(),
         }
     }
