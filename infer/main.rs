@@ -2,6 +2,7 @@
 
 mod ablate;
 mod assets;
+mod baselines;
 mod evaluate;
 mod export;
 mod figures;
@@ -22,6 +23,7 @@ use object_pba::{
     initial_guess::Start,
 };
 
+use evaluate::Evaluation;
 use export::Format;
 use input::Input;
 
@@ -65,6 +67,8 @@ enum Command {
         /// Folder for the tables.
         #[arg(long)]
         out: PathBuf,
+        #[command(flatten)]
+        evaluation: Evaluation,
         #[command(flatten)]
         options: Options,
     },
@@ -138,7 +142,9 @@ fn main() -> ExitCode {
         Command::Run { sequence, out, input, options } => {
             run::run(&sequence, &out, &input, &options)
         }
-        Command::Evaluate { dataset, out, options } => evaluate::evaluate(&dataset, &out, &options),
+        Command::Evaluate { dataset, out, evaluation, options } => {
+            evaluate::evaluate(&dataset, &out, &evaluation, &options)
+        }
         Command::Ablate { sequences, out, options } => ablate::ablate(&sequences, &out, &options),
         Command::Export { run, formats } => export::export(&run, &formats),
     };
