@@ -8,6 +8,7 @@ mod export;
 mod figures;
 mod input;
 mod output;
+mod report;
 mod run;
 
 use std::{path::PathBuf, process::ExitCode};
@@ -46,6 +47,9 @@ enum Command {
         /// Folder for the pictures, the cloud and the cameras.
         #[arg(long, default_value = "runs/demo")]
         out: PathBuf,
+        /// Leave out report/index.html.
+        #[arg(long)]
+        no_report: bool,
         #[command(flatten)]
         options: Options,
     },
@@ -56,6 +60,9 @@ enum Command {
         /// Folder for the results.
         #[arg(long)]
         out: PathBuf,
+        /// Leave out report/index.html.
+        #[arg(long)]
+        no_report: bool,
         #[command(flatten)]
         input: Input,
         #[command(flatten)]
@@ -138,9 +145,9 @@ impl Options {
 
 fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Demo { out, options } => run::demo(&out, &options),
-        Command::Run { sequence, out, input, options } => {
-            run::run(&sequence, &out, &input, &options)
+        Command::Demo { out, no_report, options } => run::demo(&out, !no_report, &options),
+        Command::Run { sequence, out, no_report, input, options } => {
+            run::run(&sequence, &out, !no_report, &input, &options)
         }
         Command::Evaluate { dataset, out, evaluation, options } => {
             evaluate::evaluate(&dataset, &out, &evaluation, &options)

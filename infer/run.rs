@@ -18,7 +18,7 @@ use object_pba::{
 };
 use serde::Serialize;
 
-use crate::{Options, assets, input::Input, output};
+use crate::{Options, assets, input::Input, output, report};
 
 /// What `metrics.json` holds.
 #[derive(Clone, Debug, Serialize)]
@@ -83,17 +83,25 @@ pub const NO_REFERENCE_MASK: &str = "the first frame, to which all others refer,
 pub struct Reconstruction {
     pub outcome: Outcome,
     pub history: Vec<Step>,
+    /// The unknowns at each step of the history; some 2 KB each.
+    pub trace: Vec<Unknowns>,
     pub report: Report,
 }
 
-pub fn demo(out: &Path, options: &Options) -> Result<()> {
+pub fn demo(out: &Path, with_report: bool, options: &Options) -> Result<()> {
     let sequence = out.join("sequence");
     assets::unpack_sample_sequence(&sequence)
         .with_context(|| format!("cannot write to {}", sequence.display()))?;
-    run(&sequence, out, &Input::default(), options)
+    run(&sequence, out, with_report, &Input::default(), options)
 }
 
-pub fn run(sequence: &Path, out: &Path, input: &Input, options: &Options) -> Result<()> {
+pub fn run(
+    sequence: &Path,
+    out: &Path,
+    with_report: bool,
+    input: &Input,
+    options: &Options,
+) -> Result<()> {
     let config = options.bundle_adjustment()?;
     let sequence = input.read(sequence)?;
     let device = options.device.device().autodiff();
@@ -109,8 +117,14 @@ pub fn run(sequence: &Path, out: &Path, input: &Input, options: &Options) -> Res
     bar.finish_and_clear();
 
     output::write(out, &prior, &sequence, &config, options.device, &reconstruction)?;
+    if with_report {
+        report::write(out, &prior, &sequence, &config, options.device, &reconstruction)?;
+    }
     print_summary(&reconstruction.report);
     println!("Results are in {}:", out.display());
+    if with_report {
+        println!("  report/index.html  all of it in 3D, step by step: open it in a browser");
+    }
     println!("  stages.png       what each stage aligned: reference, target, residual (Fig. 5)");
     println!("  cloud.png        the point cloud from the reference camera and around it");
     println!("  points.ply       the cloud, coloured where it was seen");
@@ -133,9 +147,10 @@ pub fn reconstruct_and_score(
 ) -> Result<Reconstruction> {
     let device = backend.device().autodiff();
     let start = Instant::now();
-    let mut history = Vec::new();
+    let (mut history, mut trace) = (Vec::new(), Vec::new());
     let outcome = reconstruct(prior, sequence, config, &device, &mut |step, unknowns| {
         history.push(step.clone());
+        trace.push(unknowns.clone());
         observe(step, unknowns);
     });
     let missing = match config.start {
@@ -166,7 +181,7 @@ pub fn reconstruct_and_score(
             .as_ref()
             .map(|found| UncertaintyReport::new(found, sequence, &outcome.unknowns, &device)),
     };
-    Ok(Reconstruction { outcome, history, report })
+    Ok(Reconstruction { outcome, history, trace, report })
 }
 
 fn progress_bar(sequence: &Sequence, config: &BundleAdjustmentConfig) -> ProgressBar {
