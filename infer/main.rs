@@ -3,6 +3,7 @@
 mod ablate;
 mod assets;
 mod baselines;
+mod colmap;
 mod evaluate;
 mod export;
 mod figures;

@@ -20,7 +20,7 @@ use super::measured::Measured;
 /// Longest side of a picture in the list of sequences, in pixels.
 const THUMBNAIL: u32 = 112;
 /// The reference frame of a sequence, small.
-pub const THUMBNAIL_FILE: &str = "reference.jpg";
+pub const THUMBNAIL_FILE: &str = "reference.png";
 
 /// `None` where the truth does not tell.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]

@@ -26,6 +26,10 @@ pub enum Method {
     Retrieval,
     /// Bundle adjustment without a prior: Adam on poses and free points.
     FreePoints,
+    /// COLMAP, given the camera and the masks.
+    Colmap,
+    /// COLMAP, given the camera: it may use the ground.
+    ColmapUnmasked,
 }
 
 impl Method {
@@ -47,6 +51,8 @@ impl Method {
             Self::MeanShape => "mean shape".into(),
             Self::Retrieval => "nearest training shape".into(),
             Self::FreePoints => "free points".into(),
+            Self::Colmap => "COLMAP on the object".into(),
+            Self::ColmapUnmasked => "COLMAP on whole frames".into(),
         }
     }
 

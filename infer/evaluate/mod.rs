@@ -43,18 +43,28 @@ use crate::{Options, baselines::Neighbours};
 /// What to evaluate, beside the chosen solver.
 #[derive(Args)]
 pub struct Evaluation {
-    /// Other methods to evaluate beside the solver, with commas between them: `paper` (Algorithm 1 on
-    /// L_ph, on L_CD and on both, and every frame by itself; Table 1 and Fig. 3), `baselines`
-    /// (per-frame, mean-shape, retrieval, free-points), `all`, or any by name.
+    /// Other methods to evaluate beside the solver, with commas between them: `paper` (Table 1 and Fig. 3:
+    /// Algorithm 1 on L_ph, on L_CD and on both, and every frame by itself), `baselines` (per-frame,
+    /// mean-shape, retrieval, free-points), `all` of these and the solver from the truth, or any by
+    /// name, colmap and colmap-unmasked too. Each arm of Algorithm 1, from-truth and free-points cost
+    /// about as much as the solver or more, retrieval makes the training shapes anew once, the others
+    /// cost next to nothing.
     #[arg(long, default_value = "solver", value_name = "LIST")]
     methods: Methods,
-    /// Run the solver on the first frames alone, too: so many (Fig. 4), as in 1,2,5,10,15.
+    /// Run the solver on the first frames alone, too: so many (Fig. 4), as in 1,2,5,10,15, which costs
+    /// about as much again as all 15 do.
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     views: Vec<usize>,
     /// Folder of another program's estimates: below it, a folder of each sequence's name with a
     /// transforms.json or a COLMAP model, and a points.ply if there is one. May be repeated.
     #[arg(long, value_name = "DIR")]
     estimates: Vec<PathBuf>,
+    /// Write each sequence's own report, which the page links to: some MB each.
+    #[arg(long)]
+    reports: bool,
+    /// The program to run as COLMAP.
+    #[arg(long, value_name = "PATH", default_value = "colmap")]
+    colmap: PathBuf,
 }
 
 impl Evaluation {
@@ -90,6 +100,8 @@ pub fn evaluate(
             config,
             backend: options.device,
             neighbours: Neighbours::default(),
+            colmap: evaluation.colmap.clone(),
+            reports: evaluation.reports,
         },
     };
     let entries = side_by_side(&sequences, |path| plan.work_on(path));

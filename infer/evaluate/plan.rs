@@ -18,9 +18,13 @@ use super::{
     floors::{self, Floors},
     methods::Method,
     side_by_side::guarded,
-    store::{self, Estimate, Found, MadeFrom, MethodResult},
-    work::{Applied, Context},
+    store::{self, Found, MadeFrom, MethodResult},
+    work::Context,
 };
+use crate::report;
+
+/// A sequence's own report, below its folder.
+pub const REPORT: &str = "report/index.html";
 
 /// One thing to compute of a sequence.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,22 +127,29 @@ impl Plan {
     }
 
     fn compute(&self, task: &Task, sequence: &Sequence, folder: &Path) -> Result<MethodResult> {
+        let own = folder.join(task.name());
         let applied = match task {
-            Task::Method(method) => self.context.apply(*method, sequence)?,
+            Task::Method(method) => self.context.apply(*method, sequence, &own)?,
             Task::Views(n_views) => self.context.first_views(*n_views, sequence)?,
             Task::Estimates(estimates) => {
-                let estimated =
-                    Estimated::read(&estimates.join(folder.file_name().unwrap_or_default()))?;
+                let name = folder.file_name().unwrap_or_default();
+                let estimated = Estimated::read(&estimates.join(name))?;
                 return estimated.judge(sequence, &self.context.device());
             }
         };
-        let Applied { result, initial, last } = applied;
-        last.write(&folder.join(task.name()), sequence)?;
-        let initial = initial.filter(|_| *task == Task::Method(Method::Solver));
-        initial
-            .map(|initial: Estimate| initial.write(&folder.join("initial"), sequence))
-            .transpose()?;
-        Ok(result)
+        if let Some(estimate) = applied.last {
+            estimate.write(&own, sequence)?;
+        }
+        if *task == Task::Method(Method::Solver) {
+            if let Some(estimate) = applied.initial {
+                estimate.write(&folder.join("initial"), sequence)?;
+            }
+            if let Some(found) = applied.reconstruction.filter(|_| self.context.reports) {
+                let Context { prior, config, backend, .. } = &self.context;
+                report::write(folder, prior, sequence, config, *backend, &found)?;
+            }
+        }
+        Ok(applied.result)
     }
 
     /// What is kept in a file, or is computed and kept now. Tables follow from the file alone, so that
@@ -156,8 +167,10 @@ impl Plan {
         let made_from = self.made_from(name, sequence);
         // Another program's estimates may have changed, and take no time to judge.
         let lasts = !name.starts_with("estimates-");
+        let lacks_report =
+            name == Method::Solver.name() && self.context.reports && !folder.join(REPORT).is_file();
         match store::find(&path, &made_from) {
-            Found::Kept(result) if lasts => {
+            Found::Kept(result) if lasts && !lacks_report => {
                 *n_kept += 1;
                 return Ok(result);
             }

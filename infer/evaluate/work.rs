@@ -1,6 +1,9 @@
 //! One method on one sequence.
 
-use std::time::Instant;
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 use anyhow::Result;
 use burn::tensor::{Device, Tensor, TensorData};
@@ -21,11 +24,15 @@ use object_pba::{
 };
 
 use super::{
+    estimates::Estimated,
     measured::Measured,
     methods::Method,
     store::{Estimate, MethodResult, peak_memory_mb},
 };
-use crate::{baselines, run::reconstruct_and_score};
+use crate::{
+    baselines, colmap,
+    run::{Reconstruction, reconstruct_and_score},
+};
 
 /// What all methods share.
 pub struct Context {
@@ -33,18 +40,24 @@ pub struct Context {
     pub config: BundleAdjustmentConfig,
     pub backend: Backend,
     pub neighbours: baselines::Neighbours,
+    /// The program that is COLMAP.
+    pub colmap: PathBuf,
+    /// Whether each sequence gets a report of its own.
+    pub reports: bool,
 }
 
 /// What a method found, judged, and the poses and clouds that it was judged by.
 pub struct Applied {
     pub result: MethodResult,
     pub initial: Option<Estimate>,
-    pub last: Estimate,
+    pub last: Option<Estimate>,
+    /// What a report shows, of bundle adjustment with the prior.
+    pub reconstruction: Option<Reconstruction>,
 }
 
 impl Context {
-    /// Applies a method to a sequence.
-    pub fn apply(&self, method: Method, sequence: &Sequence) -> Result<Applied> {
+    /// Applies a method to a sequence; other programs leave what they like in `folder`.
+    pub fn apply(&self, method: Method, sequence: &Sequence, folder: &Path) -> Result<Applied> {
         let mut config = method.config(&self.config);
         match method {
             Method::Solver | Method::Photometric | Method::Silhouette | Method::Algorithm1 => {
@@ -57,6 +70,8 @@ impl Context {
             Method::PerFrame => self.per_frame(sequence),
             Method::MeanShape | Method::Retrieval => self.another_shape(method, sequence),
             Method::FreePoints => self.free_points(sequence, &config),
+            Method::Colmap => self.colmap(sequence, folder, true),
+            Method::ColmapUnmasked => self.colmap(sequence, folder, false),
         }
     }
 
@@ -83,20 +98,21 @@ impl Context {
     fn adjusted(&self, sequence: &Sequence, config: &BundleAdjustmentConfig) -> Result<Applied> {
         let found =
             reconstruct_and_score(&self.prior, sequence, config, self.backend, &mut |_, _| {})?;
-        let (outcome, report) = (found.outcome, found.report);
+        let report = &found.report;
         let generator = &self.prior.shape.generator;
         let estimate = |unknowns: &Unknowns| self.estimate(generator, unknowns);
         Ok(Applied {
-            initial: Some(estimate(&outcome.stages[0].1)),
-            last: estimate(&outcome.unknowns),
+            initial: Some(estimate(&found.outcome.stages[0].1)),
+            last: Some(estimate(&found.outcome.unknowns)),
             result: MethodResult {
                 initial: Some(report.initial.clone().into()),
                 last: report.last.clone().into(),
                 seconds: Some(report.seconds),
                 status: Some(report.status),
-                report: Some(serde_json::to_value(&report)?),
+                report: Some(serde_json::to_value(report)?),
                 ..self.found(sequence)
             },
+            reconstruction: Some(found),
         })
     }
 
@@ -122,7 +138,8 @@ impl Context {
         let reference = found.cloud(0, prior, &device);
         Ok(Applied {
             initial: None,
-            last: Estimate { camera_from_world: found.poses, points: Some(reference) },
+            last: Some(Estimate { camera_from_world: found.poses, points: Some(reference) }),
+            reconstruction: None,
             result: MethodResult { last, seconds: Some(seconds), ..self.found(sequence) },
         })
     }
@@ -157,6 +174,15 @@ impl Context {
         Ok(applied)
     }
 
+    fn colmap(&self, sequence: &Sequence, folder: &Path, masked: bool) -> Result<Applied> {
+        let start = Instant::now();
+        let poses = colmap::poses(&self.colmap, sequence, folder, masked)?;
+        let seconds = start.elapsed().as_secs_f64();
+        let mut result = Estimated::in_its_own_world(poses).judge(sequence, &self.device())?;
+        result.seconds = Some(seconds);
+        Ok(Applied { result, initial: None, last: None, reconstruction: None })
+    }
+
     fn start(&self, sequence: &Sequence) -> Result<Unknowns> {
         let hypotheses = baselines::hypotheses(&self.prior, sequence, &self.config)?;
         Ok(hypotheses[0].unknowns.clone())
@@ -172,7 +198,7 @@ impl Context {
         let last = score(sequence, shape, unknowns, &self.device()).into();
         let last_estimate = self.estimate(shape, unknowns);
         let result = MethodResult { last, seconds: Some(seconds), ..self.found(sequence) };
-        Applied { result, initial: None, last: last_estimate }
+        Applied { result, initial: None, last: Some(last_estimate), reconstruction: None }
     }
 
     fn estimate(&self, shape: &dyn ShapeModel, unknowns: &Unknowns) -> Estimate {

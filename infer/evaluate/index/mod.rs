@@ -1,14 +1,15 @@
 //! `index.html`: one page that says how an evaluation went, and shows every sequence.
 
-use std::{fs, path::Path};
+use std::{io::Cursor, path::Path};
 
 use base64::{Engine, prelude::BASE64_STANDARD};
+use image::ImageFormat;
 
 use super::{
     floors::THUMBNAIL_FILE,
     grid::{Grid, escaped},
     measured::Metric,
-    plan::{Entry, Plan},
+    plan::{Entry, Plan, REPORT},
     states::{INITIAL, Scored, State},
     summary::{StateSummary, Summary},
     table::{headline, number, percent},
@@ -131,7 +132,7 @@ fn row(
     let name = escaped(&entry.sequence);
     let mut cells = format!(
         "<td>{}</td><td class=\"name\" data-value=\"{name}\">{name}</td>",
-        thumbnail(&folder.join(THUMBNAIL_FILE), &name)
+        thumbnail(&folder, &name)
     );
     let cell = |value: Option<f64>, text: String, less: bool| {
         let class = if less { " class=\"less\"" } else { "" };
@@ -157,16 +158,22 @@ fn row(
 
 /// To the sequence's own report, where one was written.
 fn link(folder: &Path, sequence: &str) -> String {
-    match folder.join("report/index.html").is_file() {
-        true => format!("<a href=\"sequences/{}/report/index.html\">report</a>", escaped(sequence)),
+    match folder.join(REPORT).is_file() {
+        true => format!("<a href=\"sequences/{}/{REPORT}\">report</a>", escaped(sequence)),
         false => String::new(),
     }
 }
 
-fn thumbnail(path: &Path, name: &str) -> String {
-    let Ok(bytes) = fs::read(path) else { return String::new() };
-    let data = BASE64_STANDARD.encode(bytes);
-    format!(
-        "<img alt=\"reference frame of {name}\" loading=\"lazy\" src=\"data:image/jpeg;base64,{data}\">"
-    )
+/// The reference frame, beside the cloud where a report drew it.
+fn thumbnail(folder: &Path, name: &str) -> String {
+    let of_report = image::open(folder.join("report/thumb.png"));
+    let picture = of_report.or_else(|_| image::open(folder.join(THUMBNAIL_FILE)));
+    let mut bytes = Cursor::new(Vec::new());
+    let written =
+        picture.and_then(|picture| picture.into_rgb8().write_to(&mut bytes, ImageFormat::Jpeg));
+    if written.is_err() {
+        return String::new();
+    }
+    let data = BASE64_STANDARD.encode(bytes.into_inner());
+    format!("<img alt=\"{name}\" loading=\"lazy\" src=\"data:image/jpeg;base64,{data}\">")
 }
