@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::output::significant;
 
+/// Printed numbers below this are rounding errors.
+const NEARLY_ZERO: f64 = 5e-5;
+
 /// Everything that a state is judged by; `None` where the truth, or the method, does not tell.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -99,7 +102,10 @@ impl Metric {
 
     /// A value as pages print it.
     pub fn cell(&self, value: Option<f64>) -> String {
-        value.map_or("–".into(), |value| significant(value * self.factor))
+        value.map_or("–".into(), |value| match value * self.factor {
+            value if value.abs() < NEARLY_ZERO => "0".into(),
+            value => significant(value),
+        })
     }
 
     /// A value as figures draw it.

@@ -61,7 +61,8 @@ pub fn page(
         ("headline", escaped(&format!("{}, {} points", headline(summary), summary.n_points))),
         ("cards", cards(summary)),
         ("figures", figures.iter().map(figure).collect()),
-        ("tables", tables.iter().map(Grid::html).collect()),
+        ("methods", tables.iter().take(1).map(Grid::html).collect()),
+        ("tables", tables.iter().skip(1).map(Grid::html).collect()),
         ("headings", columns().iter().map(heading).collect()),
         ("rows", rows),
     ];
