@@ -88,9 +88,9 @@ pub fn write_stages(
         .with_context(|| format!("cannot create {}", folder.display()))?;
     let mut rows = Vec::new();
     for (idx, (name, unknowns)) in outcome.stages.iter().enumerate() {
-        let generator = &prior.shape.generator;
+        let shape = outcome.shape(&prior.shape.generator);
         let pseudo_render = &config.objective.pseudo_render;
-        let views = views(sequence, generator, unknowns, pseudo_render, device);
+        let views = views(sequence, &shape, unknowns, pseudo_render, device);
         let row = stage(sequence, &views);
         save(&row, &folder.join(format!("{idx:02}_{}.png", name.replace(' ', "_"))))?;
         rows.push(row);

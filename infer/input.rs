@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::Args;
 use object_pba::data::{
     formats::{Reading, SequenceHints, read_sequence},
@@ -33,6 +33,11 @@ pub struct Input {
     /// Most frames to take.
     #[arg(long)]
     max_frames: Option<usize>,
+    /// The reference frame, whose points the others are compared with; it counts from 0 among the
+    /// frames that are taken, and comes first in the results. One in the middle is seen from most of
+    /// them, and it needs a mask.
+    #[arg(long, default_value_t = 0)]
+    reference: usize,
 }
 
 impl Input {
@@ -47,6 +52,16 @@ impl Input {
             max_frames: self.max_frames,
         };
         let Reading { sequence, layout, notes } = read_sequence(path, &hints)?;
+        let n_frames = sequence.frames.len();
+        if self.reference >= n_frames {
+            let last = n_frames - 1;
+            bail!(
+                "{}: --reference is {}, and its frames are 0 to {last}",
+                path.display(),
+                self.reference
+            );
+        }
+        let sequence = sequence.with_reference(self.reference);
         let [width, height] = sequence.size;
         eprintln!(
             "{}: {layout}, {} frames of {width} × {height}, focal length {:.1} px",

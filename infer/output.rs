@@ -47,7 +47,7 @@ pub fn write(
     reconstruction: &Reconstruction,
 ) -> Result<()> {
     let device = backend.device();
-    let generator = &prior.shape.generator;
+    let shape = reconstruction.outcome.shape(&prior.shape.generator);
     let unknowns = &reconstruction.outcome.unknowns;
     let poses = unknowns.camera_from_world(&device);
     let trajectory = Trajectory {
@@ -59,9 +59,9 @@ pub fn write(
     };
     write_trajectory(&out.join("transforms.json"), &trajectory)?;
 
-    let views = views(sequence, generator, unknowns, &config.objective.pseudo_render, &device);
+    let views = views(sequence, &shape, unknowns, &config.objective.pseudo_render, &device);
     let colors = figures::point_colors(sequence, &views);
-    let cloud = host_points(&points(generator, unknowns, &device));
+    let cloud = host_points(&points(&shape, unknowns, &device));
     let ply = ply::PointCloud {
         points: cloud.iter().map(|&point| Point3::from(point)).collect(),
         colors: Some(colors.iter().map(|color| color.unwrap_or(UNSEEN)).collect()),

@@ -161,7 +161,8 @@ pub fn reconstruct_and_score(
     let seconds = start.elapsed().as_secs_f64();
 
     let generator = &prior.shape.generator;
-    let judge = |unknowns: &Unknowns| score(sequence, generator, unknowns, &device);
+    let shape = outcome.shape(generator);
+    let judge = |unknowns: &Unknowns| score(sequence, &shape, unknowns, &device);
     let report = Report {
         initial: judge(&outcome.stages[0].1),
         last: judge(&outcome.unknowns),

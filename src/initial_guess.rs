@@ -18,8 +18,8 @@ use crate::{
     silhouette::MASK_THRESHOLD,
 };
 
-/// Share of the likeliest pose's confidence that another needs to be tried: front and back look alike
-/// coarsely, and where the regressor is sure, it is more often right than a coarse fit.
+/// Share of the likeliest pose's confidence, tempered as the config has it, that another needs to be tried:
+/// front and back look alike coarsely.
 const LEAST_CONFIDENCE: f32 = 0.2;
 /// Turn from one frame to the next, in radians, beyond which a regressed pose is not believed.
 const LARGEST_TURN: f32 = 0.5;
@@ -73,7 +73,7 @@ impl InitialGuess {
         let (mask, intrinsics) = (&frame.mask, &sequence.intrinsics);
         let crop = CropCamera::around_silhouette(mask, MASK_THRESHOLD, intrinsics, size, margin)?;
         let (color, mask) = crop.warp(&frame.color, &frame.mask);
-        let guess = prior.regressors.regress(&color, &mask, &crop);
+        let guess = prior.regressors.regress(&color, &mask, &crop, prior.config.looks());
         let to_camera = |(pose, confidence)| (crop.camera_from_world(&pose), confidence);
         let poses = guess.poses.into_iter().map(to_camera).collect();
         Some(Self { style: guess.style, poses })
@@ -103,14 +103,16 @@ impl InitialGuess {
                 Unknowns::with_poses(&followed(pose, &guesses[1..]), &style, parameterisation)
             }
         };
-        let hypothesis = |&(pose, confidence)| Hypothesis { unknowns: unknowns(pose), confidence };
-        reference.likely_poses().map(hypothesis).collect()
+        let hypothesis = |(pose, confidence)| Hypothesis { unknowns: unknowns(pose), confidence };
+        reference.likely_poses(config.confidence_exponent).map(hypothesis).collect()
     }
 
-    /// Those of the poses that are not too unlikely.
-    fn likely_poses(&self) -> impl Iterator<Item = &(Isometry3<f32>, f32)> {
-        let least = LEAST_CONFIDENCE * self.poses[0].1;
-        self.poses.iter().filter(move |(_, confidence)| *confidence >= least)
+    /// Those of the poses that are not too unlikely, with confidences raised to a power.
+    fn likely_poses(&self, exponent: f32) -> impl Iterator<Item = (Isometry3<f32>, f32)> {
+        let tempered =
+            self.poses.iter().map(move |(pose, confidence)| (*pose, confidence.powf(exponent)));
+        let least = LEAST_CONFIDENCE * self.poses[0].1.powf(exponent);
+        tempered.filter(move |(_, confidence)| *confidence >= least)
     }
 }
 
@@ -191,7 +193,11 @@ mod tests {
     fn only_poses_that_are_likely_enough_are_tried() {
         let poses = [0.6, 0.2, 0.1].map(|confidence| (Isometry3::identity(), confidence));
         let guess = InitialGuess { style: vec![0.0; 3], poses: poses.to_vec() };
-        assert_eq!(guess.likely_poses().count(), 2);
+        assert_eq!(guess.likely_poses(1.0).count(), 2);
+        // Of the square root, a tenth is a third.
+        let tempered: Vec<f32> =
+            guess.likely_poses(0.5).map(|(_, confidence)| confidence).collect();
+        assert_eq!(tempered, [0.6f32, 0.2, 0.1].map(f32::sqrt));
     }
 
     #[test]

@@ -72,8 +72,7 @@ pub struct SilhouettePair {
 impl SilhouettePair {
     /// Squared distance in pixels from where its point is projected.
     fn squared(&self, projected: &[[f32; 2]]) -> f32 {
-        let [u, v] = self.target.offset(projected[self.point_idx as usize]);
-        u * u + v * v
+        self.target.squared(projected[self.point_idx as usize])
     }
 }
 
@@ -84,18 +83,25 @@ pub struct SilhouetteMatching {
     pub to_outline: bool,
     /// Weights of a pixel's distance to its point, and of a point's to its pixel.
     pub weights: [f32; 2],
-    /// Distances in pixels up to which either counts as matched. Eq. 5 has none, and then asks for
-    /// points exactly at the centres of pixels, and for as many of them as there are pixels.
-    ///
-    /// The first is for samples of the outline. Pixels have one of their own, `hole_tolerance`.
-    pub tolerances: [f32; 2],
-    /// Distance in pixels up to which a pixel counts as covered, and along the outline up to which a
-    /// point reaches it. Where the outline is matched, pixels inside only tell holes. A tolerance below the spacing of the points would hold each to a pixel,
-    /// while the cloud may slide along under all of them: solvers then hardly move.
-    pub hole_tolerance: f32,
+    pub tolerances: SilhouetteTolerances,
     /// Share of the pixels, of the outline's samples and of the points whose distances, the largest of
     /// each, are left out.
     pub trim: f32,
+}
+
+/// Distances in pixels up to which something counts as matched. Eq. 5 has none, and then asks for points
+/// exactly at the centres of pixels, and for as many of them as there are pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct SilhouetteTolerances {
+    /// From a sample of the outline to the point that reaches it.
+    pub coverage: f32,
+    /// From a pixel's centre to the point that covers it, and how far along the outline a point reaches
+    /// it. Where the outline is matched, pixels inside only tell holes: one below the spacing of the
+    /// points would hold each to a pixel, while the cloud may slide along under all of them, and solvers
+    /// would hardly move.
+    pub hole: f32,
+    /// From a point to the inside.
+    pub containment: f32,
 }
 
 /// Pairs each silhouette pixel with its nearest projected point, and each point with its nearest
@@ -106,18 +112,18 @@ pub fn silhouette_pairs(
     visible: &[u32],
     matching: &SilhouetteMatching,
 ) -> Vec<SilhouettePair> {
-    let ([of_pixel, of_point], [coverage, containment]) = (matching.weights, matching.tolerances);
+    let ([of_pixel, of_point], tolerances) = (matching.weights, matching.tolerances);
     let grid = PixelGrid::new(silhouette.size(), visible.iter().map(|&i| projected[i as usize]));
     let cover = |&pixel: &[f32; 2]| {
         let (point_idx, target) = (visible[grid.nearest(pixel) as usize], pixel.into());
-        SilhouettePair { point_idx, target, weight: of_pixel, tolerance: matching.hole_tolerance }
+        SilhouettePair { point_idx, target, weight: of_pixel, tolerance: tolerances.hole }
     };
     let reach = |sample: usize| {
-        let point_idx = visible[grid.nearest(silhouette.outline[sample]) as usize];
-        let at = projected[point_idx as usize];
-        let target = silhouette.toward(sample, at, matching.hole_tolerance);
+        let segment = silhouette.segment(sample, tolerances.hole);
+        let point_idx = visible[grid.nearest_to(&segment) as usize];
+        let target = segment.nearest(projected[point_idx as usize]);
         let weight = of_pixel * Silhouette::OUTLINE_WEIGHT;
-        SilhouettePair { point_idx, target, weight, tolerance: coverage }
+        SilhouettePair { point_idx, target, weight, tolerance: tolerances.coverage }
     };
     let contain = |&point_idx: &u32| {
         let at = projected[point_idx as usize];
@@ -125,7 +131,7 @@ pub fn silhouette_pairs(
             true => silhouette.nearest_inside(at),
             false => silhouette.nearest_pixel(at).into(),
         };
-        SilhouettePair { point_idx, target, weight: of_point, tolerance: containment }
+        SilhouettePair { point_idx, target, weight: of_point, tolerance: tolerances.containment }
     };
     let counted = |pairs: &mut dyn ExactSizeIterator<Item = SilhouettePair>| {
         let n_pairs = pairs.len();
@@ -203,8 +209,7 @@ mod tests {
             let matching = SilhouetteMatching {
                 to_outline: false,
                 weights: [1.0; 2],
-                tolerances: [0.1; 2],
-                hole_tolerance: 0.1,
+                tolerances: SilhouetteTolerances { coverage: 0.1, hole: 0.1, containment: 0.1 },
                 trim,
             };
             let pairs = silhouette_pairs(&silhouette, &projected, &points, &matching);

@@ -1,11 +1,12 @@
 //! Exact nearest neighbours in an image (the first minimum of Eq. 5), in time O(pixels + points).
 //!
 //! Points fall into the buckets of a grid, and a query looks at its own bucket and at ring after ring
-//! around it. Points that cover an image end that search at once; where they do not, a tree goes on.
+//! around it. Points that cover an image end that search at once; where they do not, a tree goes on for
+//! the many pixels, and rings for the few pieces of an outline.
 
 use std::cell::OnceCell;
 
-use crate::nearest_neighbours::NearestNeighbours;
+use crate::{nearest_neighbours::NearestNeighbours, silhouette::Segment};
 
 /// Rings around a query that are searched before the tree is asked.
 const MAX_RINGS: i32 = 12;
@@ -64,22 +65,45 @@ impl PixelGrid {
         if self.locations.is_empty() {
             return 0;
         }
-        let cell = self.cell_of(query);
+        let squared = |[u, v]: [f32; 2]| (u - query[0]).powi(2) + (v - query[1]).powi(2);
+        self.search(query, 0.0, MAX_RINGS, squared)
+            .unwrap_or_else(|| self.locations[self.tree().nearest_pixel(query) as usize].1)
+    }
+
+    /// The index of the location nearest to a segment whose middle lies in the image; where there are no
+    /// locations, it is just zero.
+    pub fn nearest_to(&self, segment: &Segment) -> u32 {
+        let squared = |location| segment.nearest(location).squared(location);
+        let all_rings = self.columns.max(self.rows);
+        self.search(segment.middle, segment.reach, all_rings, squared).unwrap_or(0)
+    }
+
+    /// The location with the least squared distance from something around `center` that extends over
+    /// `extent` pixels; `None` where it may lie beyond the last ring.
+    fn search(
+        &self,
+        center: [f32; 2],
+        extent: f32,
+        n_rings: i32,
+        squared: impl Fn([f32; 2]) -> f32,
+    ) -> Option<u32> {
+        let cell = self.cell_of(center);
         let to_border = [0, 1].map(|axis| {
-            let from_left = query[axis] - cell[axis] as f32 * self.side;
+            let from_left = center[axis] - cell[axis] as f32 * self.side;
             from_left.min(self.side - from_left)
         });
         let to_border = to_border[0].min(to_border[1]);
         let mut best: Best = (f32::INFINITY, 0);
-        for ring in 0..MAX_RINGS {
-            self.search_ring(cell, ring, query, &mut best);
+        for ring in 0..n_rings {
+            self.search_ring(cell, ring, &squared, &mut best);
             // Whatever lies beyond this ring is farther away.
-            let reached = ring as f32 * self.side + to_border;
+            let reached = (ring as f32 * self.side + to_border - extent).max(0.0);
             if best.0 <= reached * reached {
-                return best.1;
+                return Some(best.1);
             }
         }
-        self.locations[self.tree().nearest_pixel(query) as usize].1
+        let seen_all = n_rings >= self.columns.max(self.rows);
+        seen_all.then_some(best.1)
     }
 
     fn tree(&self) -> &NearestNeighbours {
@@ -87,19 +111,32 @@ impl PixelGrid {
         self.tree.get_or_init(|| NearestNeighbours::in_plane(pixels()))
     }
 
-    fn search_ring(&self, [column, row]: [i32; 2], ring: i32, query: [f32; 2], best: &mut Best) {
+    fn search_ring(
+        &self,
+        [column, row]: [i32; 2],
+        ring: i32,
+        squared: &impl Fn([f32; 2]) -> f32,
+        best: &mut Best,
+    ) {
         let (left, right) = (column - ring, column + ring);
         for at in [row - ring, row + ring].iter().take(if ring == 0 { 1 } else { 2 }) {
-            self.search_run(*at, left, right, query, best);
+            self.search_run(*at, left, right, squared, best);
         }
         for at in row - ring + 1..row + ring {
-            self.search_run(at, left, left, query, best);
-            self.search_run(at, right, right, query, best);
+            self.search_run(at, left, left, squared, best);
+            self.search_run(at, right, right, squared, best);
         }
     }
 
     /// Buckets beside one another hold locations behind one another.
-    fn search_run(&self, row: i32, left: i32, right: i32, query: [f32; 2], best: &mut Best) {
+    fn search_run(
+        &self,
+        row: i32,
+        left: i32,
+        right: i32,
+        squared: &impl Fn([f32; 2]) -> f32,
+        best: &mut Best,
+    ) {
         let (left, right) = (left.max(0), right.min(self.columns - 1));
         if row < 0 || row >= self.rows || left > right {
             return;
@@ -107,8 +144,8 @@ impl PixelGrid {
         let first = (row * self.columns + left) as usize;
         let last = (row * self.columns + right) as usize + 1;
         let run = self.starts[first] as usize..self.starts[last] as usize;
-        for &([u, v], idx) in &self.locations[run] {
-            let squared = (u - query[0]).powi(2) + (v - query[1]).powi(2);
+        for &(location, idx) in &self.locations[run] {
+            let squared = squared(location);
             if squared < best.0 {
                 *best = (squared, idx);
             }
@@ -165,6 +202,35 @@ mod tests {
         check_nearest(&random(300, 3, [0.0, 2.0]));
         check_nearest(&random(50, 4, [-500.0, -80.0]));
         check_nearest(&[[3.0, 4.0]]);
+    }
+
+    /// Against the distance to many places along the segment.
+    #[test]
+    fn the_location_nearest_to_a_segment_is_the_brute_force_one() {
+        let mut rng = keyed_rng(5, [0, 0]);
+        for locations in [
+            random(1500, 6, [0.0, 40.0]),
+            random(40, 7, [-10.0, 50.0]),
+            random(50, 8, [-500.0, -80.0]),
+        ] {
+            let grid = PixelGrid::new(SIZE, locations.iter().copied());
+            for _ in 0..100 {
+                let middle = SIZE.map(|side| rng.random_range(0.0..side as f32));
+                let turn: f32 = rng.random_range(0.0..6.3);
+                let segment = Segment { middle, tangent: [turn.cos(), turn.sin()], reach: 3.0 };
+                let distance = |at: &[f32; 2]| {
+                    let places = (-300..=300).map(|k| {
+                        let place =
+                            [0, 1].map(|i| middle[i] + 0.01 * k as f32 * segment.tangent[i]);
+                        (at[0] - place[0]).hypot(at[1] - place[1])
+                    });
+                    places.fold(f32::INFINITY, f32::min)
+                };
+                let least = locations.iter().map(distance).fold(f32::INFINITY, f32::min);
+                let found = distance(&locations[grid.nearest_to(&segment) as usize]);
+                assert!(found < least + 0.01, "{found} is not {least}");
+            }
+        }
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::{
 use crate::{
     camera::{Intrinsics, NEAR, Pose},
     host::host_points,
-    loss::{SilhouetteMatching, SilhouettePair, silhouette_pairs},
+    loss::{SilhouetteMatching, SilhouettePair, SilhouetteTolerances, silhouette_pairs},
     pseudo_render::visible_points,
 };
 
@@ -135,9 +135,11 @@ fn pairs(
     let [width, height] = observations.size.map(|side| side as f32);
     let spacing = (width * height / pixels[0].len() as f32).sqrt();
     let slack = config.tolerance_per_blur * observations.blurs[level];
-    let tolerances = [config.coverage_tolerance * spacing, config.containment_tolerance];
-    let tolerances = tolerances.map(|tolerance| tolerance + slack);
-    let hole_tolerance = config.hole_tolerance * spacing + slack;
+    let tolerances = SilhouetteTolerances {
+        coverage: config.coverage_tolerance * spacing + slack,
+        hole: config.hole_tolerance * spacing + slack,
+        containment: config.containment_tolerance + slack,
+    };
     let everything: Vec<u32> = (0..pixels[0].len() as u32).collect();
     (first..frames.len())
         .into_par_iter()
@@ -150,10 +152,12 @@ fn pairs(
                 Reduction::Sum => [1.0; 2],
                 Reduction::Mean => [silhouette.pixels.len(), visible.len()].map(|n| 1.0 / n as f32),
             };
-            let to_outline = config.silhouette_outline;
-            let trim = config.silhouette_trim;
-            let matching =
-                SilhouetteMatching { to_outline, weights, tolerances, hole_tolerance, trim };
+            let matching = SilhouetteMatching {
+                to_outline: config.silhouette_outline,
+                weights,
+                tolerances,
+                trim: config.silhouette_trim,
+            };
             Some((f, silhouette_pairs(silhouette, &pixels[f], visible, &matching)))
         })
         .collect()

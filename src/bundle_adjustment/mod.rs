@@ -4,6 +4,7 @@ pub mod adam;
 pub mod alternating;
 mod color_slope;
 pub mod correspondences;
+pub mod displacement;
 mod evaluation;
 mod exposure;
 mod hypotheses;
@@ -19,6 +20,7 @@ mod progress;
 mod rows;
 mod shape_jacobian;
 pub mod shape_model;
+mod smooth_field;
 #[cfg(test)]
 mod tests;
 mod uncertainty;
@@ -30,6 +32,7 @@ use serde::{Deserialize, Serialize};
 use self::{
     adam::AdamConfig,
     alternating::AlternatingConfig,
+    displacement::{Displaced, Displacement, DisplacementConfig, leave_manifold},
     hypotheses::{Run, drop_those_behind},
     joint_lbfgs::JointLbfgsConfig,
     levenberg_marquardt::LevenbergMarquardtConfig,
@@ -86,6 +89,9 @@ pub struct BundleAdjustmentConfig {
     /// same in frames 2° apart, and alike over a whole bumper. A view shows some 0.2 squared diagonals of a
     /// car, and a patch that errs together is about a tenth of a diagonal wide: 20.
     pub independent_observations: f64,
+    /// The power that the regressor's confidences are raised to: below one, it is believed less than it
+    /// believes itself, as it has to be on shapes unlike those that it has seen.
+    pub confidence_exponent: f32,
     /// How far a hypothesis may be behind the best one after the coarse levels, in nats of the same
     /// measure; it is dropped beyond.
     pub drop_margin: f64,
@@ -93,6 +99,7 @@ pub struct BundleAdjustmentConfig {
     pub initial_style: InitialStyle,
     pub initial_motion: InitialMotion,
     pub objective: ObjectiveConfig,
+    pub displacement: DisplacementConfig,
     pub adam: AdamConfig,
     pub lm: LevenbergMarquardtConfig,
     pub lbfgs: JointLbfgsConfig,
@@ -106,11 +113,13 @@ impl Default for BundleAdjustmentConfig {
             blurs: vec![3.0, 1.5, 0.7, 0.0],
             n_hypotheses: 2,
             independent_observations: 20.0,
+            confidence_exponent: 1.0,
             drop_margin: 5.0,
             start: Start::default(),
             initial_style: InitialStyle::default(),
             initial_motion: InitialMotion::default(),
             objective: ObjectiveConfig::default(),
+            displacement: DisplacementConfig::default(),
             adam: AdamConfig::default(),
             lm: LevenbergMarquardtConfig::default(),
             lbfgs: JointLbfgsConfig::default(),
@@ -136,7 +145,12 @@ impl BundleAdjustmentConfig {
             Solver::Lbfgs => self.lbfgs.iterations + 1,
             Solver::AlternatingLbfgs => 3 * self.alternating.max_rounds + 1,
         };
-        per_level * self.n_hypotheses.max(1) * self.blurs.len()
+        let beyond = if self.leaves_manifold() { per_level } else { 0 };
+        per_level * self.n_hypotheses.max(1) * self.blurs.len() + beyond
+    }
+
+    fn leaves_manifold(&self) -> bool {
+        self.solver == Solver::Lm && self.displacement.n_modes > 0
     }
 
     /// Algorithm 1 on Eq. 6, as the paper prints them.
@@ -155,6 +169,8 @@ impl BundleAdjustmentConfig {
 /// What bundle adjustment found.
 pub struct Outcome {
     pub unknowns: Unknowns,
+    /// How points may leave the prior's manifold, where that is solved for: see [`shape`](Self::shape).
+    pub displacement: Option<Displacement>,
     pub status: Status,
     /// The unknowns after each stage, the initial ones first (Fig. 5).
     pub stages: Vec<(String, Unknowns)>,
@@ -166,6 +182,13 @@ pub struct Outcome {
     pub exposures: Option<Vec<Exposure>>,
     /// Of what was found; Levenberg–Marquardt alone knows it.
     pub uncertainty: Option<Uncertainty>,
+}
+
+impl Outcome {
+    /// The shape model of its unknowns and of those of all its stages, which `prior` began with.
+    pub fn shape<'a>(&'a self, prior: &'a dyn ShapeModel) -> Displaced<'a> {
+        Displaced { prior, displacement: self.displacement.as_ref() }
+    }
 }
 
 /// Adjusts poses and shape to a sequence, from one or several initial guesses, likeliest first.
@@ -214,17 +237,35 @@ pub fn bundle_adjust(
                 ([a.rank().0, b.rank().0], [a.rank().1, b.rank().1]);
             a_faulty.cmp(&b_faulty).then(a.total_cmp(&b))
         });
-    let Run { unknowns, stages, report, .. } = best.expect("the best is never dropped");
+    let Run { mut unknowns, mut stages, mut report, .. } = best.expect("the best is never dropped");
+    let mut displacement = None;
+    if config.leaves_manifold() && !report.status.is_fault() {
+        std::mem::swap(&mut progress.stages, &mut stages);
+        let configs = (&config.displacement, &config.lm);
+        let (moved, ending) =
+            leave_manifold(&objective, &mut unknowns, last_level, configs, &mut progress);
+        std::mem::swap(&mut progress.stages, &mut stages);
+        report.status = ending.status;
+        displacement = Some(moved);
+    }
+    let shape = Displaced { prior: shape, displacement: displacement.as_ref() };
+    let objective = Objective { shape: &shape, device: device.clone(), ..objective };
     let certain = || {
         let n_observations = config.independent_observations;
-        uncertainty(&objective, &unknowns, last_level, &config.lm, n_observations)
+        let n_directions =
+            displacement.as_ref().map_or(config.lm.n_directions, Displacement::n_solved);
+        let lm = LevenbergMarquardtConfig { n_directions, ..config.lm.clone() };
+        uncertainty(&objective, &unknowns, last_level, &lm, n_observations)
     };
     let known = config.solver == Solver::Lm && !report.status.is_fault();
     let exposures = || objective.value(&unknowns, last_level).1.exposures;
+    let exposures = config.objective.solve_exposure.then(exposures);
+    let uncertainty = known.then(certain).flatten();
     Outcome {
-        exposures: config.objective.solve_exposure.then(exposures),
-        uncertainty: known.then(certain).flatten(),
+        exposures,
+        uncertainty,
         unknowns,
+        displacement,
         status: report.status,
         iterations: progress.iteration,
         stages,

@@ -1,12 +1,10 @@
-//! ∂X/∂s, which hides in the network, by differences of decoded neighbours.
+//! ∂X/∂s on the host, taken again only where the style has moved on.
 
 use burn::tensor::{Tensor, TensorData};
 
 use super::{objective::Objective, unknowns::Unknowns};
 use crate::host::host_points;
 
-/// Step of the style for the differences, in standard deviations.
-const STEP: f32 = 0.05;
 /// How far any direction may be from where the derivatives were taken, in standard deviations.
 const TOLERANCE: f32 = 0.2;
 
@@ -37,19 +35,12 @@ impl ShapeJacobian {
         if n_directions == self.n_directions && moved <= TOLERANCE {
             return;
         }
-        // The style itself, then a row for each direction.
-        let mut rows = style.repeat(1 + n_directions);
-        (0..n_directions).for_each(|i| rows[(1 + i) * style.len() + i] += STEP);
-        let rows = TensorData::new(rows, [1 + n_directions, style.len()]);
-        let device = objective.device.clone().inner();
-        let clouds = host_points(&objective.shape.points(Tensor::from_data(rows, &device)));
-        let (points, moved) = clouds.split_at(clouds.len() / (1 + n_directions));
-        let slope = |point: usize, direction: usize| {
-            let there = moved[direction * points.len() + point];
-            std::array::from_fn(|i| (there[i] - points[point][i]) / STEP)
-        };
-        let of_point = |point| (0..n_directions).map(move |direction| slope(point, direction));
-        self.derivatives = (0..points.len()).flat_map(of_point).collect();
+        let row = TensorData::new(style.clone(), [1, style.len()]);
+        let row = Tensor::from_data(row, &objective.device.clone().inner());
+        let slopes = host_points(&objective.shape.derivatives(row, n_directions));
+        let n_points = slopes.len() / n_directions;
+        let of_point = |point| (0..n_directions).map(move |i| i * n_points + point);
+        self.derivatives = (0..n_points).flat_map(of_point).map(|i| slopes[i]).collect();
         (self.style, self.n_directions) = (style, n_directions);
     }
 }

@@ -96,6 +96,16 @@ impl Default for SequenceOptions {
 }
 
 impl Sequence {
+    /// The same pictures, of which another is the reference frame: it comes first, the others keep their
+    /// order. Panics if there is no such frame.
+    pub fn with_reference(mut self, frame: usize) -> Self {
+        self.frames[..=frame].rotate_right(1);
+        if let Some(truth) = &mut self.truth {
+            truth.camera_from_world[..=frame].rotate_right(1);
+        }
+        self
+    }
+
     /// Renders a sequence of a mesh in the canonical frame. The same seed makes the same sequence.
     pub fn render(mesh: &Mesh, options: &SequenceOptions, seed: u64) -> Self {
         let [mut motion_rng, mut scene_rng, mut points_rng] =
@@ -265,5 +275,19 @@ mod tests {
         let [first, again, other] = [render(5), render(5), render(6)];
         assert_eq!(first.frames[7].color, again.frames[7].color);
         assert_ne!(first.frames[7].color, other.frames[7].color);
+    }
+
+    #[test]
+    fn any_frame_may_be_the_reference() {
+        let options = SequenceOptions { n_frames: 4, size: [16, 12], ..Default::default() };
+        let sequence = Sequence::render(&crate::data::procedural::car(1), &options, 1);
+        let before = sequence.clone();
+        let after = sequence.with_reference(2);
+        let poses =
+            |sequence: &Sequence| sequence.truth.clone().expect("rendered").camera_from_world;
+        for (place, frame) in [2, 0, 1, 3].into_iter().enumerate() {
+            assert_eq!(after.frames[place].path, before.frames[frame].path);
+            assert_eq!(poses(&after)[place], poses(&before)[frame]);
+        }
     }
 }

@@ -3,6 +3,7 @@
 //! The paper trains two networks of its TL-embedding; ours share their convolutions, which are
 //! nearly all of the cost, and differ in their heads.
 
+mod mirror;
 mod pose;
 mod style;
 mod trunk;
@@ -22,6 +23,9 @@ use crate::{
     data::{ColorImage, ScalarImage, crop::CropCamera},
     host::host_values,
 };
+
+/// Radians within which two hypotheses mean one pose.
+const SAME_POSE: f32 = 0.5;
 
 /// The sizes of the regressors.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -101,6 +105,27 @@ pub struct Guess {
     pub poses: Vec<(Isometry3<f32>, f32)>,
 }
 
+/// How a picture is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Looks {
+    One,
+    /// And once more in the mirror, for symmetric shapes: both guesses are averaged.
+    WithMirror,
+}
+
+impl Guess {
+    /// The mean of this guess and one of the same picture in the mirror.
+    fn and(self, in_mirror: Self) -> Self {
+        let back: Vec<_> =
+            in_mirror.poses.iter().map(|(pose, sure)| (mirror::mirrored(pose), *sure)).collect();
+        let styles = self.style.iter().zip(&in_mirror.style);
+        Self {
+            style: styles.map(|(one, other)| 0.5 * (one + other)).collect(),
+            poses: mirror::agreed(&self.poses, &back),
+        }
+    }
+}
+
 impl Regressors {
     /// Side of the square crops to give to [`regress`](Self::regress), in pixels.
     pub fn crop_size(&self) -> usize {
@@ -113,16 +138,45 @@ impl Regressors {
     }
 
     /// The style and the poses of the object in a crop, whose background may hold anything.
-    pub fn regress(&self, color: &ColorImage, mask: &ScalarImage, camera: &CropCamera) -> Guess {
-        let device = self.style.device();
+    pub fn regress(
+        &self,
+        color: &ColorImage,
+        mask: &ScalarImage,
+        camera: &CropCamera,
+        looks: Looks,
+    ) -> Guess {
         let shape = [1, self.crop_size, self.crop_size, 4];
-        let crop = Tensor::from_data(TensorData::new(crop_values(color, mask), shape), &device);
+        let crop = TensorData::new(crop_values(color, mask), shape);
         let focal_ratio = camera.intrinsics.focal[0] / self.crop_size as f32;
-        let (style, pose) = self.forward(crop, Tensor::from_floats([[focal_ratio]], &device));
-        Guess {
-            style: host_values(&style),
-            poses: self.pose.hypotheses(&host_values(&pose), focal_ratio),
+        let crop = Tensor::from_data(crop, &self.style.device());
+        self.guesses(crop, &[focal_ratio], looks).remove(0)
+    }
+
+    /// The same of crops `[b, size, size, 4]`, see [`crop_values`], and their cameras' focal lengths in
+    /// units of the crop's side.
+    pub fn guesses(&self, crops: Tensor<4>, focal_ratios: &[f32], looks: Looks) -> Vec<Guess> {
+        let guesses = self.look(crops.clone(), focal_ratios);
+        match looks {
+            Looks::One => guesses,
+            Looks::WithMirror => {
+                let in_mirror = self.look(crops.flip([2]), focal_ratios);
+                guesses.into_iter().zip(in_mirror).map(|(one, other)| one.and(other)).collect()
+            }
         }
+    }
+
+    fn look(&self, crops: Tensor<4>, focal_ratios: &[f32]) -> Vec<Guess> {
+        let column = TensorData::new(focal_ratios.to_vec(), [focal_ratios.len(), 1]);
+        let column = Tensor::from_data(column, &crops.device());
+        let (styles, poses) = self.forward(crops, column);
+        let ([_, n_style], [_, n_outputs]) = (styles.dims(), poses.dims());
+        let (styles, poses) = (host_values(&styles), host_values(&poses));
+        let rows = styles.chunks(n_style).zip(poses.chunks(n_outputs)).zip(focal_ratios);
+        rows.map(|((style, outputs), &focal_ratio)| Guess {
+            style: style.to_vec(),
+            poses: self.pose.hypotheses(outputs, focal_ratio),
+        })
+        .collect()
     }
 
     /// Styles `[b, k]` and the pose head's outputs `[b, m]`, from crops `[b, size, size, 4]` and
@@ -137,6 +191,7 @@ impl Regressors {
 pub(crate) mod tests {
     use super::*;
     use crate::camera::Intrinsics;
+    use burn::tensor::Distribution;
 
     pub fn tiny() -> RegressorConfig {
         RegressorConfig {
@@ -162,14 +217,37 @@ pub(crate) mod tests {
             let regressors = config.init(5, &Device::flex());
             let source = Intrinsics { focal: [100.0; 2], center: [32.0; 2] };
             let camera = CropCamera::around([10.0, 20.0, 50.0, 40.0], &source, 32, 0.1);
-            let guess =
-                regressors.regress(&ColorImage::new(32, 32), &ScalarImage::new(32, 32), &camera);
+            let (color, mask) = (ColorImage::new(32, 32), ScalarImage::new(32, 32));
+            for looks in [Looks::One, Looks::WithMirror] {
+                let guess = regressors.regress(&color, &mask, &camera, looks);
+                assert_eq!(guess.style.len(), 5);
+                assert!(guess.poses.iter().all(|(pose, _)| pose.translation.z > 0.0));
+                assert!(guess.poses.windows(2).all(|pair| pair[0].1 >= pair[1].1));
+                let total: f32 = guess.poses.iter().map(|(_, confidence)| confidence).sum();
+                assert!((total - 1.0).abs() < 1e-5);
+            }
+        }
+    }
 
-            assert_eq!(guess.style.len(), 5);
-            assert!(guess.poses.iter().all(|(pose, _)| pose.translation.z > 0.0));
-            assert!(guess.poses.windows(2).all(|pair| pair[0].1 >= pair[1].1));
-            let total: f32 = guess.poses.iter().map(|(_, confidence)| confidence).sum();
-            assert!((total - 1.0).abs() < 1e-5);
+    /// Of a picture and its mirror image, two looks make one guess, and its mirror image.
+    #[test]
+    fn two_looks_do_not_tell_left_from_right() {
+        let device = Device::flex();
+        let regressors = tiny().init(5, &device);
+        let crops = Tensor::<4>::random([3, 32, 32, 4], Distribution::Uniform(0.0, 1.0), &device);
+        let focal_ratios = [1.2, 2.0, 1.6];
+        let guesses = regressors.guesses(crops.clone(), &focal_ratios, Looks::WithMirror);
+        let in_mirror =
+            regressors.guesses(crops.clone().flip([2]), &focal_ratios, Looks::WithMirror);
+        let alone = regressors.guesses(crops, &focal_ratios, Looks::One);
+        for ((guess, other), alone) in guesses.iter().zip(&in_mirror).zip(&alone) {
+            assert_ne!(guess.style, alone.style);
+            for (a, b) in guess.style.iter().zip(&other.style) {
+                assert!((a - b).abs() < 1e-5, "{a} is not {b}");
+            }
+            let [pose, back] = [guess.poses[0].0, mirror::mirrored(&other.poses[0].0)];
+            assert!(pose.rotation.angle_to(&back.rotation) < 1e-2, "{pose} is not {back}");
+            assert!((pose.translation.vector - back.translation.vector).norm() < 1e-4);
         }
     }
 }

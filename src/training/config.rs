@@ -5,7 +5,11 @@ use std::{fs, path::Path};
 use serde::{Deserialize, Serialize};
 
 use super::{DataConfig, augmentation::AugmentationConfig};
-use crate::{Error, Result, regressor::RegressorConfig, shape_prior::ShapePriorConfig};
+use crate::{
+    Error, Result,
+    regressor::{Looks, RegressorConfig},
+    shape_prior::ShapePriorConfig,
+};
 
 /// A whole run: two runs of one config give the same weights.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -126,6 +130,11 @@ impl TrainingConfig {
         let config: Self = toml::from_str(text).map_err(|error| invalid(error.to_string()))?;
         config.check().map_err(invalid)?;
         Ok(config)
+    }
+
+    /// How these regressors look at a picture: in the mirror, too, if mirrored shapes are shapes.
+    pub fn looks(&self) -> Looks {
+        if self.regressors.augmentation.mirror { Looks::WithMirror } else { Looks::One }
     }
 
     /// Why this cannot be trained, if it cannot.

@@ -5,7 +5,7 @@ use indicatif::ProgressBar;
 
 use super::{
     TrainingConfig,
-    batches::cloud_tensor,
+    batches::{cloud_tensor, row_tensor},
     crops::{Crop, crops_of_models, render_model},
     pose_errors::PoseErrors,
     regressor_stage::regress,
@@ -14,7 +14,10 @@ use super::{
     styles::Styles,
 };
 use crate::{
-    Result, chamfer::chamfer_distance, host::host_values, regressor::Regressors,
+    Result,
+    chamfer::chamfer_distance,
+    host::host_values,
+    regressor::{Guess, Looks, Regressors},
     shape_prior::ShapePrior,
 };
 
@@ -24,6 +27,7 @@ const CHUNK: usize = 64;
 pub(super) struct HeldOut<'a> {
     prior: &'a ShapePrior,
     device: &'a Device,
+    looks: Looks,
     crops: Vec<Crop>,
     styles: Styles,
     /// Clouds of the shapes.
@@ -43,6 +47,7 @@ impl<'a> HeldOut<'a> {
         Ok(Self {
             prior,
             device,
+            looks: config.looks(),
             crops: render(config, shapes, &models)?,
             styles: Styles::encode(prior, &seen, device),
             truth: truth.into_iter().map(|Surface(points)| points).collect(),
@@ -62,12 +67,9 @@ impl<'a> HeldOut<'a> {
             let share_of = |loss: Tensor<1>| share * f64::from(host_values(&loss)[0]);
             style_loss += share_of(regressors.style.loss(styles, targets, deviations.clone()));
             let targets: Vec<_> = crops.iter().map(Crop::pose_target).collect();
-            pose_loss += share_of(regressors.pose.loss(poses.clone(), &targets));
-
-            let [_, n_outputs] = poses.dims();
-            for (crop, outputs) in crops.iter().zip(host_values(&poses).chunks(n_outputs)) {
-                let hypotheses = regressors.pose.hypotheses(outputs, crop.focal_ratio);
-                pose_errors.push(&hypotheses, &crop.crop_from_world);
+            pose_loss += share_of(regressors.pose.loss(poses, &targets));
+            for (crop, guess) in crops.iter().zip(self.guesses(regressors, crops)) {
+                pose_errors.push(&guess.poses, &crop.crop_from_world);
             }
         }
         let mut measurements = vec![("held_out_loss", pose_loss + style_loss)];
@@ -86,11 +88,20 @@ impl<'a> HeldOut<'a> {
         };
         let (mut regressed, mut encoded) = (0.0, 0.0);
         for (crops, truth) in self.crops.chunks(n_views).zip(&self.truth) {
-            let (style, _) = self.regress(regressors, &crops[..1]);
-            regressed += chamfer(style, truth);
+            let guess = self.guesses(regressors, &crops[..1]).remove(0);
+            regressed += chamfer(row_tensor(&[guess.style], self.device), truth);
             encoded += chamfer(self.styles.of(&crops[..1], self.device), truth);
         }
         vec![("regressed_chamfer", regressed), ("encoded_chamfer", encoded)]
+    }
+
+    /// What [`InitialGuess`](crate::initial_guess::InitialGuess) would start from.
+    fn guesses(&self, regressors: &Regressors, crops: &[Crop]) -> Vec<Guess> {
+        let values: Vec<_> = crops.iter().map(Crop::values).collect();
+        let size = regressors.crop_size();
+        let values = row_tensor(&values, self.device).reshape([crops.len(), size, size, 4]);
+        let focal_ratios: Vec<_> = crops.iter().map(|crop| crop.focal_ratio).collect();
+        regressors.guesses(values, &focal_ratios, self.looks)
     }
 
     fn regress(&self, regressors: &Regressors, crops: &[Crop]) -> (Tensor<2>, Tensor<2>) {

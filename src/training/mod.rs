@@ -32,6 +32,7 @@ pub use prior_report::{
     Reconstruction, ReconstructionErrors, ReportedShapes, TrainingShapes, report_prior,
 };
 pub use shards::write_shard;
+pub use stage::Measurements;
 
 use std::{fs, path::Path, sync::Mutex};
 
@@ -44,6 +45,8 @@ use crate::{
     Error, Result,
     checkpoint::{CONFIG_FILE, REGRESSORS_FILE, SHAPE_FILE, load_shape, save_weights},
     config::write_config,
+    regressor::Regressors,
+    shape_prior::ShapePrior,
 };
 use shapes::Shapes;
 
@@ -75,6 +78,21 @@ pub fn train_regressors(config: &TrainingConfig, out: &Path, device: &Device) ->
     let stage = regressor_stage::RegressorStage::prepare(config, &shapes, &prior, out, device)?;
     save_weights(&stage.train()?, &path)?;
     stage.finish(&path)
+}
+
+/// What regressors make of pictures of shapes that training held out: errors by name, in degrees, and in
+/// 1e-3 squared world units.
+pub fn report_regressors(
+    config: &TrainingConfig,
+    prior: &ShapePrior,
+    regressors: &Regressors,
+    device: &Device,
+) -> Result<Measurements> {
+    let shapes = Shapes::open(&config.data, config.seed)?;
+    let held_out = held_out::HeldOut::prepare(config, &shapes, prior, device)?;
+    let mut measurements = held_out.measure(regressors);
+    measurements.extend(held_out.measure_clouds(regressors));
+    Ok(measurements)
 }
 
 /// Makes the folder, and writes the effective config into it; another run's folder is refused.

@@ -23,7 +23,7 @@ pub(super) const SCALE: f64 = 1e3;
 /// Terms of a loss, by name, `[1]` each; training goes down their sum.
 pub(super) type Terms = Vec<(&'static str, Tensor<1>)>;
 /// Measurements, by name.
-pub(super) type Measurements = Vec<(&'static str, f64)>;
+pub type Measurements = Vec<(&'static str, f64)>;
 
 /// One stage of a run, in its folder.
 pub(super) struct Stage<'a> {

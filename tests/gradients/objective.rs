@@ -29,17 +29,14 @@ const N_POINTS: usize = 64;
 
 /// Ours, ours with everything that may be switched on, and the paper's.
 fn configs() -> [ObjectiveConfig; 3] {
-    // Within a reach along the outline, distances across it jump where another point becomes the nearest,
-    // by what points lie apart: pixels, with a hundred of them. Without one they are continuous.
-    let ours = || ObjectiveConfig { hole_tolerance: 0.0, ..ObjectiveConfig::default() };
     let all = ObjectiveConfig {
         refine_focal: true,
         solve_exposure: true,
         silhouette_norm: SilhouetteNorm::Unsquared,
         silhouette_trim: 0.1,
-        ..ours()
+        ..ObjectiveConfig::default()
     };
-    [ObjectiveConfig::paper(), ours(), all]
+    [ObjectiveConfig::paper(), ObjectiveConfig::default(), all]
 }
 
 /// Smooth pictures of a disc, each a little unlike the last.

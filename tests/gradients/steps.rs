@@ -12,8 +12,8 @@ use object_pba::{
     data::{ColorImage, ScalarImage},
     host::{host_pixels, index_tensor},
     loss::{
-        SilhouetteLoss, SilhouetteMatching, SilhouetteNorm, charbonnier, silhouette_distances,
-        silhouette_pairs,
+        SilhouetteLoss, SilhouetteMatching, SilhouetteNorm, SilhouetteTolerances, charbonnier,
+        silhouette_distances, silhouette_pairs,
     },
     sampling::ImageTable,
     shape_prior::ShapePriorConfig,
@@ -123,8 +123,9 @@ fn silhouette_distances_to_points() {
     {
         let loss = SilhouetteLoss { norm, scale: 0.8 };
         let weights = [0.3, 0.7];
-        let hole_tolerance = 1.5 * tolerances[0];
-        let matching = SilhouetteMatching { to_outline, weights, tolerances, hole_tolerance, trim };
+        let [coverage, containment] = tolerances;
+        let tolerances = SilhouetteTolerances { coverage, hole: 1.5 * coverage, containment };
+        let matching = SilhouetteMatching { to_outline, weights, tolerances, trim };
         let distances = |pixels: Tensor<1>| {
             let pixels = pixels.reshape([1, 40, 2]);
             let projected = &host_pixels(&pixels)[0];

@@ -34,7 +34,8 @@ pub struct InspectArguments {
     /// shapes are grey, reconstructions blue, nearest training shapes orange and walks green.
     #[arg(long)]
     prior: Option<PathBuf>,
-    /// Folder for inspect.json and contact_sheet.png, or of a prior prior.json and prior.png.
+    /// Folder for inspect.json and contact_sheet.png, or of a prior prior.json, prior.png and, for shapes
+    /// that training held out, regressors.json.
     #[arg(long, default_value = "runs/inspect")]
     out: PathBuf,
     #[command(flatten)]

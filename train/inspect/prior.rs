@@ -1,13 +1,13 @@
 //! What a shape prior makes of shapes that it has not seen, and what its style directions do.
 
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 use burn::tensor::{Device, Tensor, TensorData};
 use image::{RgbImage, imageops};
 use nalgebra::{Point3, Vector3};
 use object_pba::{
     Error, Result,
-    checkpoint::{CONFIG_FILE, SHAPE_FILE, load_shape},
+    checkpoint::{CONFIG_FILE, REGRESSORS_FILE, SHAPE_FILE, load_regressors, load_shape},
     data::{
         cloud_picture::{PAPER, draw_cloud},
         collection::Model,
@@ -19,7 +19,8 @@ use object_pba::{
     pseudo_render::surface::Surface,
     shape_prior::ShapePrior,
     training::{
-        Reconstruction, ReconstructionErrors, ReportedShapes, TrainingConfig, report_prior,
+        Measurements, Reconstruction, ReconstructionErrors, ReportedShapes, TrainingConfig,
+        report_prior, report_regressors,
     },
 };
 use serde::Serialize;
@@ -48,6 +49,7 @@ pub fn inspect(folder: &Path, models: Option<Vec<Model>>, out: &Path) -> Result<
     let device = Backend::default().device();
     let config = TrainingConfig::read(&folder.join(CONFIG_FILE))?;
     let prior = load_shape(&config, &folder.join(SHAPE_FILE), &device)?;
+    let own = models.is_none();
     let shapes = models.map_or(ReportedShapes::HeldOut, ReportedShapes::Models);
     let reconstructions = report_prior(&config, &prior, shapes, &device)?;
 
@@ -63,6 +65,15 @@ pub fn inspect(folder: &Path, models: Option<Vec<Model>>, out: &Path) -> Result<
     print_table(&report);
     let json = serde_json::to_string_pretty(&report).expect("a report is plain data");
     write_atomically(&out.join("prior.json"), json.as_bytes())?;
+    let regressors = folder.join(REGRESSORS_FILE);
+    if own && regressors.exists() {
+        let regressors = load_regressors(&config, prior.n_style(), &regressors, &device)?;
+        let measurements = report_regressors(&config, &prior, &regressors, &device)?;
+        print_measurements(&measurements);
+        let measurements: BTreeMap<_, _> = measurements.into_iter().collect();
+        let json = serde_json::to_string_pretty(&measurements).expect("numbers have names");
+        write_atomically(&out.join("regressors.json"), json.as_bytes())?;
+    }
 
     let mut rows: Vec<Vec<RgbImage>> = Vec::new();
     for pair in reconstructions[..reconstructions.len().min(MAX_SHAPES)].chunks(2) {
@@ -102,6 +113,13 @@ fn print_table(report: &Report) {
         println!(
             "{id:32} {decoded:9.4} {fitted:9.4} {floor:9.4} {ratio:7.2} {retrieved:9.4} {mean_shape:10.4}"
         );
+    }
+}
+
+fn print_measurements(measurements: &Measurements) {
+    println!("\nRegressors, on pictures of these shapes (clouds: 1e-3 squared diagonals)");
+    for (name, value) in measurements {
+        println!("{name:34} {value:9.4}");
     }
 }
 

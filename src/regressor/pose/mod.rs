@@ -16,14 +16,13 @@ use burn::{
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
+use super::SAME_POSE;
 use crate::{data::viewpoint::orbit_rotation, host::index_tensor, layers::rectified_linear};
 
 /// Directions around the object that the anchors look from.
 const N_ANCHORS: usize = 16;
 /// Radians above the object's equator that they look from: about the middle of the views.
 const ANCHOR_ELEVATION: f32 = 0.35;
-/// Radians within which two anchors mean one pose.
-const SAME_POSE: f32 = 0.5;
 /// An object's depth in focal lengths of the crop, where its diagonal of 1 just fits.
 const TYPICAL_DEPTH: f32 = 1.1;
 
