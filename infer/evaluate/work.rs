@@ -99,8 +99,8 @@ impl Context {
         let found =
             reconstruct_and_score(&self.prior, sequence, config, self.backend, &mut |_, _| {})?;
         let report = &found.report;
-        let generator = &self.prior.shape.generator;
-        let estimate = |unknowns: &Unknowns| self.estimate(generator, unknowns);
+        let shape = found.outcome.shape(&self.prior.shape.generator);
+        let estimate = |unknowns: &Unknowns| self.estimate(&shape, unknowns);
         Ok(Applied {
             initial: Some(estimate(&found.outcome.stages[0].1)),
             last: Some(estimate(&found.outcome.unknowns)),
