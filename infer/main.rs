@@ -2,6 +2,8 @@
 
 mod ablate;
 mod assets;
+mod baselines;
+mod colmap;
 mod evaluate;
 mod export;
 mod figures;
@@ -23,6 +25,7 @@ use object_pba::{
     initial_guess::Start,
 };
 
+use evaluate::Evaluation;
 use export::Format;
 use input::Input;
 
@@ -72,6 +75,8 @@ enum Command {
         /// Folder for the tables.
         #[arg(long)]
         out: PathBuf,
+        #[command(flatten)]
+        evaluation: Evaluation,
         #[command(flatten)]
         options: Options,
     },
@@ -145,7 +150,9 @@ fn main() -> ExitCode {
         Command::Run { sequence, out, no_report, input, options } => {
             run::run(&sequence, &out, !no_report, &input, &options)
         }
-        Command::Evaluate { dataset, out, options } => evaluate::evaluate(&dataset, &out, &options),
+        Command::Evaluate { dataset, out, evaluation, options } => {
+            evaluate::evaluate(&dataset, &out, &evaluation, &options)
+        }
         Command::Ablate { sequences, out, options } => ablate::ablate(&sequences, &out, &options),
         Command::Export { run, formats } => export::export(&run, &formats),
     };

@@ -15,7 +15,7 @@ use crate::{
     data::sequence::Sequence,
     host::{host_pixels, host_points},
     initial_guess::{InitialGuess, Start, true_unknowns},
-    metrics::{PoseErrors, style_error},
+    metrics::{CloudErrors, PoseErrors},
     pseudo_render::{PseudoRenderConfig, visible_points},
 };
 
@@ -52,6 +52,8 @@ pub struct Scores {
     pub poses: PoseErrors,
     /// Eq. 7, raw, in squared world units (diagonal 1).
     pub style_error: Option<f64>,
+    /// Its two parts, unsquared distances and the shares within 1 % of the diagonal.
+    pub cloud: Option<CloudErrors>,
     /// Eq. 3 as printed: on sharp frames, RGB in [0, 1], at full N.
     pub photometric_loss: f64,
     /// Eq. 5 as printed, in pixels².
@@ -82,13 +84,14 @@ pub fn score(
         PoseErrors::new(&estimate, &truth.camera_from_world, truth.canonical)
     });
     let true_points = truth.and_then(|truth| truth.points.as_ref());
-    let style_error = true_points.map(|truth| {
+    let cloud = true_points.map(|truth| {
         let truth: Vec<[f32; 3]> = truth.iter().map(|point| point.coords.into()).collect();
-        style_error(&host_points(&points(shape, unknowns, &device)), &truth)
+        CloudErrors::new(&host_points(&points(shape, unknowns, &device)), &truth)
     });
     Scores {
         poses: poses.unwrap_or_default(),
-        style_error,
+        style_error: cloud.as_ref().map(CloudErrors::style_error),
+        cloud,
         photometric_loss: bare.photometric,
         silhouette_loss: bare.silhouette,
     }

@@ -28,7 +28,9 @@ mod styles;
 pub use augmentation::AugmentationConfig;
 pub use config::{PriorStageConfig, RegressorStageConfig, Schedule, TrainingConfig};
 pub use data_config::DataConfig;
-pub use prior_report::{Reconstruction, ReconstructionErrors, ReportedShapes, report_prior};
+pub use prior_report::{
+    Reconstruction, ReconstructionErrors, ReportedShapes, TrainingShapes, report_prior,
+};
 pub use shards::write_shard;
 pub use stage::Measurements;
 

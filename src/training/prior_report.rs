@@ -67,7 +67,8 @@ pub fn report_prior(
 ) -> Result<Vec<Reconstruction>> {
     let n = prior.generator.n_points();
     let n_seen = config.prior.network.n_encoder_points;
-    let known = Shapes::open(&config.data, config.seed)?;
+    let training = TrainingShapes::open(config)?;
+    let known = &training.shapes;
     let (ids, surfaces) = match shapes {
         ReportedShapes::HeldOut => {
             let held_out = known.held_out();
@@ -76,7 +77,6 @@ pub fn report_prior(
         }
         ReportedShapes::Models(models) => sample(&models, config.seed, n_seen + 2 * n)?,
     };
-    let training = TrainingShapes::open(&known)?;
     let mean_shape = decode(prior, Tensor::zeros([1, prior.n_style()], device));
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} shapes (ETA {eta})");
     let cloud = |points: &[[f32; 3]]| cloud_tensor(&[points.to_vec()], device);
@@ -117,18 +117,22 @@ fn sample(models: &[Model], seed: u64, n_points: usize) -> Result<(Vec<String>, 
     Ok(models.par_iter().map(surface).collect::<Result<Vec<_>>>()?.into_iter().unzip())
 }
 
-struct TrainingShapes<'a> {
-    shapes: &'a Shapes,
+/// The shapes that a prior was trained on, made anew from its config.
+pub struct TrainingShapes {
+    shapes: Shapes,
     coarse: Vec<Surface>,
 }
 
-impl<'a> TrainingShapes<'a> {
-    fn open(shapes: &'a Shapes) -> Result<Self> {
-        Ok(Self { shapes, coarse: shapes.surfaces(&shapes.training(), N_COARSE)? })
+impl TrainingShapes {
+    pub fn open(config: &TrainingConfig) -> Result<Self> {
+        let shapes = Shapes::open(&config.data, config.seed)?;
+        let coarse = shapes.surfaces(&shapes.training(), N_COARSE)?;
+        Ok(Self { shapes, coarse })
     }
 
-    /// The cloud that is nearest to `truth` by Eq. 7, as large, and how near.
-    fn nearest(&self, truth: &[[f32; 3]]) -> Result<(Vec<[f32; 3]>, f64)> {
+    /// The cloud that is nearest to `truth` by Eq. 7, as large, and how near. The order of its points is
+    /// to say nothing of where they lie.
+    pub fn nearest(&self, truth: &[[f32; 3]]) -> Result<(Vec<[f32; 3]>, f64)> {
         let some = &truth[..N_COARSE.min(truth.len())];
         let coarse = self.coarse.iter().map(|Surface(points)| style_error(points, some));
         let mut ranked: Vec<_> = coarse.zip(self.shapes.training()).collect();

@@ -73,6 +73,15 @@ pub fn find_model(folder: &Path) -> Option<(PathBuf, Encoding)> {
         .find_map(|model| found(Encoding::Binary)(model).or_else(|| found(Encoding::Text)(model)))
 }
 
+/// Reads a model's images without opening them: their names, and `camera_from_world` of each.
+pub fn read_poses(
+    model_folder: &Path,
+    encoding: Encoding,
+) -> Result<Vec<(PathBuf, Isometry3<f32>)>> {
+    let images = read_model(model_folder, encoding)?.images;
+    Ok(images.into_iter().map(|image| (image.name.into(), image.camera_from_world)).collect())
+}
+
 /// Lists the images of a model.
 pub(super) fn list(
     folder: &Path,
@@ -83,10 +92,7 @@ pub(super) fn list(
     let [cameras_path, images_path] =
         ["cameras", "images"].map(|name| encoding.file(model_folder, name));
     hints.refuse_focal().map_err(|reason| unusable(&cameras_path, &reason))?;
-    let model = match encoding {
-        Encoding::Text => text::read(&cameras_path, &images_path)?,
-        Encoding::Binary => binary::read(&cameras_path, &images_path)?,
-    };
+    let model = read_model(model_folder, encoding)?;
     let Some(first) = model.images.first() else {
         return Err(unusable(&images_path, "it has no images"));
     };
@@ -119,6 +125,14 @@ pub(super) fn list(
     }
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(Listing { name, shots, ..Listing::default() })
+}
+
+fn read_model(folder: &Path, encoding: Encoding) -> Result<Model> {
+    let [cameras, images] = ["cameras", "images"].map(|name| encoding.file(folder, name));
+    match encoding {
+        Encoding::Text => text::read(&cameras, &images),
+        Encoding::Binary => binary::read(&cameras, &images),
+    }
 }
 
 impl Encoding {

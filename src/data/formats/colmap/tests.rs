@@ -10,15 +10,7 @@ use crate::{
 fn fixture(encoding: Encoding) -> Model {
     let name = if encoding == Encoding::Text { "text" } else { "binary" };
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/views").join(name);
-    read(&folder, encoding).expect("it is a model")
-}
-
-fn read(folder: &Path, encoding: Encoding) -> Result<Model> {
-    let [cameras, images] = ["cameras", "images"].map(|name| encoding.file(folder, name));
-    match encoding {
-        Encoding::Text => text::read(&cameras, &images),
-        Encoding::Binary => binary::read(&cameras, &images),
-    }
+    read_model(&folder, encoding).expect("it is a model")
 }
 
 /// The numbers in a line, words left out.
@@ -69,7 +61,7 @@ fn models_round_trip_to_the_last_bit_of_f32() {
     let points = vec![Point3::new(0.1, -2e-7, 3.25)];
     let cloud = PointCloud { points, colors: Some(vec![[1, 2, 3]]), visible: None };
     write(folder.path(), &trajectory, &cloud).expect("it is writable");
-    let model = read(folder.path(), Encoding::Text).expect("it is a model");
+    let model = read_model(folder.path(), Encoding::Text).expect("it is a model");
     assert_eq!(model.cameras[&1].calibration.intrinsics, trajectory.intrinsics);
     for (image, pose) in model.images.iter().zip(poses) {
         let difference = image.camera_from_world.to_homogeneous() - pose.to_homogeneous();
@@ -98,7 +90,7 @@ fn broken_text_is_refused_by_line() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         std::fs::write(folder.path().join("cameras.txt"), cameras).expect("it is writable");
         std::fs::write(folder.path().join("images.txt"), images).expect("it is writable");
-        let error = read(folder.path(), Encoding::Text).unwrap_err().to_string();
+        let error = read_model(folder.path(), Encoding::Text).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     }
 }
@@ -114,7 +106,7 @@ fn truncated_binaries_are_refused_at_any_length() {
         let bytes = std::fs::read(source.join(name)).expect("it is there");
         for n in 0..bytes.len() {
             std::fs::write(folder.path().join(name), &bytes[..n]).expect("it is writable");
-            let error = read(folder.path(), Encoding::Binary).unwrap_err().to_string();
+            let error = read_model(folder.path(), Encoding::Binary).unwrap_err().to_string();
             assert!(error.contains(name) && error.contains("ends early"), "{error}");
         }
     }
@@ -123,5 +115,5 @@ fn truncated_binaries_are_refused_at_any_length() {
     let n_points = 8 + 4 + 7 * 8 + 4 + "view_10.png\0".len();
     bytes[n_points..n_points + 8].fill(0xff);
     std::fs::write(folder.path().join("images.bin"), &bytes).expect("it is writable");
-    assert!(read(folder.path(), Encoding::Binary).is_err());
+    assert!(read_model(folder.path(), Encoding::Binary).is_err());
 }
