@@ -2,12 +2,14 @@
 
 mod ablate;
 mod assets;
+mod dataset;
 mod evaluate;
 mod export;
 mod figures;
 mod input;
 mod output;
 mod run;
+mod side_by_side;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -22,6 +24,7 @@ use object_pba::{
     initial_guess::Start,
 };
 
+use ablate::AblateArguments;
 use export::Format;
 use input::Input;
 
@@ -68,16 +71,9 @@ enum Command {
         #[command(flatten)]
         options: Options,
     },
-    /// Compare the shape prior with points that move freely (Fig. 7).
-    Ablate {
-        #[arg(required = true)]
-        sequences: Vec<PathBuf>,
-        /// Folder for the table and the pictures.
-        #[arg(long, default_value = "runs/ablate")]
-        out: PathBuf,
-        #[command(flatten)]
-        options: Options,
-    },
+    /// Compare ways to reconstruct, in tables and figures: the shape prior and free points, losses, views,
+    /// solvers, λ, parameterisation, pyramid, hypotheses and N. The same start and sequences for all.
+    Ablate(AblateArguments),
     /// Write the results of a run in the formats of other programs.
     Export {
         /// The folder that `run` or `demo` wrote.
@@ -139,7 +135,7 @@ fn main() -> ExitCode {
             run::run(&sequence, &out, &input, &options)
         }
         Command::Evaluate { dataset, out, options } => evaluate::evaluate(&dataset, &out, &options),
-        Command::Ablate { sequences, out, options } => ablate::ablate(&sequences, &out, &options),
+        Command::Ablate(arguments) => ablate::ablate(&arguments),
         Command::Export { run, formats } => export::export(&run, &formats),
     };
     match result {

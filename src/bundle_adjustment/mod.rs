@@ -15,6 +15,7 @@ mod normal_equations;
 pub mod objective;
 pub mod observations;
 mod photometric;
+pub mod point_subset;
 mod progress;
 mod rows;
 mod shape_jacobian;
