@@ -35,7 +35,7 @@ impl Results<'_> {
                 arm.name,
                 failures(entries),
                 cells.join(" | "),
-                seconds.map_or("–".into(), |[_, median, _]| significant(median))
+                seconds.map_or("–".into(), |[_, median, _]| figure(median))
             );
         }
         for (arm, entry) in arms
@@ -54,12 +54,12 @@ impl Results<'_> {
     fn cell(&self, arm: usize, metric: &Metric) -> String {
         let start = self.quartiles(arm, metric, |outcome| &outcome.start);
         let end = self.quartiles(arm, metric, |outcome| &outcome.end);
-        let Some([low, median, high]) = end.map(|end| end.map(significant)) else {
+        let Some([low, median, high]) = end.map(|end| end.map(figure)) else {
             return "–".into();
         };
         match start.filter(|_| metric.tells_start) {
             Some([_, start, _]) => {
-                format!("{} → {median} [{low}, {high}]", significant(start))
+                format!("{} → {median} [{low}, {high}]", figure(start))
             }
             None => format!("{median} [{low}, {high}]"),
         }
@@ -76,4 +76,8 @@ fn points(arms: &[Arm]) -> String {
     let mut numbers: Vec<_> = arms.iter().map(|arm| arm.n_points.to_string()).collect();
     numbers.dedup();
     numbers.join(", ")
+}
+
+fn figure(value: f64) -> String {
+    if value == 0.0 { "0".into() } else { significant(value) }
 }
