@@ -4,6 +4,7 @@ mod ablate;
 mod assets;
 mod baselines;
 mod colmap;
+mod dataset;
 mod evaluate;
 mod export;
 mod figures;
@@ -11,6 +12,7 @@ mod input;
 mod output;
 mod report;
 mod run;
+mod side_by_side;
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -25,6 +27,7 @@ use object_pba::{
     initial_guess::Start,
 };
 
+use ablate::AblateArguments;
 use evaluate::Evaluation;
 use export::Format;
 use input::Input;
@@ -80,16 +83,9 @@ enum Command {
         #[command(flatten)]
         options: Options,
     },
-    /// Compare the shape prior with points that move freely (Fig. 7).
-    Ablate {
-        #[arg(required = true)]
-        sequences: Vec<PathBuf>,
-        /// Folder for the table and the pictures.
-        #[arg(long, default_value = "runs/ablate")]
-        out: PathBuf,
-        #[command(flatten)]
-        options: Options,
-    },
+    /// Compare ways to reconstruct, in tables and figures: the shape prior and free points, losses, views,
+    /// solvers, λ, parameterisation, pyramid, hypotheses and N. The same start and sequences for all.
+    Ablate(AblateArguments),
     /// Write the results of a run in the formats of other programs.
     Export {
         /// The folder that `run` or `demo` wrote.
@@ -153,7 +149,7 @@ fn main() -> ExitCode {
         Command::Evaluate { dataset, out, evaluation, options } => {
             evaluate::evaluate(&dataset, &out, &evaluation, &options)
         }
-        Command::Ablate { sequences, out, options } => ablate::ablate(&sequences, &out, &options),
+        Command::Ablate(arguments) => ablate::ablate(&arguments),
         Command::Export { run, formats } => export::export(&run, &formats),
     };
     match result {

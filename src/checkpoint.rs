@@ -11,13 +11,18 @@ use burn::{
 };
 
 use crate::{
-    Error, Result, data::formats::write_atomically, regressor::Regressors, shape_prior::ShapePrior,
+    Error, Result,
+    data::formats::write_atomically,
+    psgn::{Psgn, PsgnConfig},
+    regressor::Regressors,
+    shape_prior::ShapePrior,
     training::TrainingConfig,
 };
 
 pub const CONFIG_FILE: &str = "config.toml";
 pub const SHAPE_FILE: &str = "prior.safetensors";
 pub const REGRESSORS_FILE: &str = "regressors.safetensors";
+pub const PSGN_FILE: &str = "psgn.safetensors";
 
 /// A trained prior, frozen: gradients pass through it and do not stay.
 #[derive(Clone, Debug)]
@@ -76,6 +81,12 @@ pub fn load_regressors(
     let bytes = read(path, "the weights of the regressors")?;
     let module = config.regressors.network.init(n_style, device);
     load_weights(module, SafetensorsStore::from_bytes(Some(bytes)), path)
+}
+
+/// Reads the direct regression of a run.
+pub fn load_psgn(config: &PsgnConfig, path: &Path, device: &Device) -> Result<Psgn> {
+    let bytes = read(path, "the weights of the point set regression")?;
+    load_weights(config.init(device), SafetensorsStore::from_bytes(Some(bytes)), path)
 }
 
 /// Writes weights, in half precision where that is beyond what training determines.

@@ -8,6 +8,7 @@
 pub mod camera;
 pub mod shape_prior;
 pub mod regressor;
+pub mod psgn;
 pub mod pseudo_render;
 pub mod sampling;
 pub mod nearest_neighbours;

@@ -28,7 +28,21 @@ pub fn reconstruct(
     device: &Device,
     observe: &mut dyn FnMut(&Step, &Unknowns),
 ) -> Option<Outcome> {
-    let hypotheses = match config.start {
+    let hypotheses = hypotheses(prior, sequence, config);
+    if hypotheses.is_empty() {
+        return None;
+    }
+    let generator = &prior.shape.generator;
+    Some(bundle_adjust(sequence, generator, &hypotheses, config, device, observe))
+}
+
+/// Where to start, likeliest first; nowhere, if what the config asks for is not known.
+pub fn hypotheses(
+    prior: &Prior,
+    sequence: &Sequence,
+    config: &BundleAdjustmentConfig,
+) -> Vec<Hypothesis> {
+    match config.start {
         Start::Regressors => InitialGuess::hypotheses(prior, sequence, config),
         Start::Truth => {
             let unknowns = true_unknowns(prior, sequence, config.objective.parameterisation);
@@ -37,12 +51,7 @@ pub fn reconstruct(
             let start = unknowns.zip(likely).map(|(truth, likely)| truth.expecting(likely));
             start.map(Hypothesis::from).into_iter().collect()
         }
-    };
-    if hypotheses.is_empty() {
-        return None;
     }
-    let generator = &prior.shape.generator;
-    Some(bundle_adjust(sequence, generator, &hypotheses, config, device, observe))
 }
 
 /// One state of a reconstruction, judged: `null` where there is no ground truth.

@@ -54,7 +54,7 @@ fn adjusted(sequence: &Sequence, points: &[Vector3<f32>], n_modes: usize) -> Fou
     let truth = sequence.truth.as_ref().expect("rendered");
     let config = BundleAdjustmentConfig {
         blurs: vec![0.7, 0.0],
-        displacement: DisplacementConfig { n_modes, ..Default::default() },
+        displacement: DisplacementConfig { n_modes, deviation: 0.03, ..Default::default() },
         lm: LevenbergMarquardtConfig { max_residuals: 2000, ..Default::default() },
         ..Default::default()
     };

@@ -78,7 +78,12 @@ impl Scene {
         let (n, _) = extent(solver);
         let config = BundleAdjustmentConfig {
             blurs: vec![1.0],
-            lm: LevenbergMarquardtConfig { iterations: n, relative_first: 1, ..Default::default() },
+            lm: LevenbergMarquardtConfig {
+                iterations: n,
+                relative_first: 1,
+                relative_tolerance: 0.0,
+                ..Default::default()
+            },
             lbfgs: JointLbfgsConfig { iterations: n, relative_first: 2, ..Default::default() },
             adam: AdamConfig { iterations: n, ..Default::default() },
             ..BundleAdjustmentConfig::preset(solver)

@@ -10,12 +10,14 @@ use object_pba::{
     device::Backend,
     training::{TrainingConfig, train_regressors, train_shape_prior},
 };
+use psgn::PsgnArguments;
 use render::RenderArguments;
 use selection::SelectionArguments;
 use shards::{MergeArguments, ShardArguments};
 
 mod inspect;
 mod coverage;
+mod psgn;
 mod render;
 mod selection;
 mod shards;
@@ -44,6 +46,9 @@ enum Command {
     Regressors(TrainArguments),
     /// Train both.
     All(TrainArguments),
+    /// Train a network that regresses a point set from one picture, without a shape prior (Fan et al. 2017), and
+    /// compare it with a prior's regressed style.
+    Psgn(PsgnArguments),
     /// Render sequences with their ground truth.
     Render(RenderArguments),
     /// Measure how far real cars are from the procedural family.
@@ -94,6 +99,7 @@ fn main() -> ExitCode {
         Command::Prior(arguments) => train(&arguments, true, false),
         Command::Regressors(arguments) => train(&arguments, false, true),
         Command::All(arguments) => train(&arguments, true, true),
+        Command::Psgn(arguments) => psgn::psgn(&arguments),
         Command::Render(arguments) => render::render(&arguments),
         Command::Coverage(arguments) => coverage::coverage(&arguments),
         Command::Shards(arguments) => shards::write(&arguments),

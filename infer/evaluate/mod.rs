@@ -9,7 +9,6 @@ mod measured;
 mod methods;
 mod plan;
 mod rows;
-mod side_by_side;
 mod states;
 mod statistics;
 mod store;
@@ -24,21 +23,17 @@ use std::{
 
 use anyhow::{Context as _, Result, bail};
 use clap::Args;
-use object_pba::{
-    config::write_config,
-    data::formats::{Layout, write_atomically},
-};
+use object_pba::{config::write_config, data::formats::write_atomically};
 
 use self::{
     measured::Metric,
     methods::{Method, Methods},
     plan::{Entry, Plan, Task},
-    side_by_side::side_by_side,
     states::{State, states},
     summary::Summary,
     work::Context,
 };
-use crate::{Options, baselines::Neighbours};
+use crate::{Options, baselines::Neighbours, dataset::sequences_below, side_by_side::side_by_side};
 
 /// What to evaluate, beside the chosen solver.
 #[derive(Args)]
@@ -182,25 +177,6 @@ fn say_what_failed(entries: &[Entry]) -> Result<()> {
         bail!("all {} sequences failed; the first: {}", entries.len(), failures[0]);
     }
     Ok(())
-}
-
-/// The folders below `dataset` that hold a sequence with its camera, in order of their names.
-fn sequences_below(dataset: &Path) -> Result<Vec<PathBuf>> {
-    let entries =
-        fs::read_dir(dataset).with_context(|| format!("cannot read {}", dataset.display()))?;
-    let mut folders: Vec<PathBuf> = entries
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.is_dir() && states_its_camera(path))
-        .collect();
-    folders.sort();
-    if folders.is_empty() {
-        bail!("{}: no folder below it holds a sequence", dataset.display());
-    }
-    Ok(folders)
-}
-
-fn states_its_camera(folder: &Path) -> bool {
-    Layout::detect(folder).is_ok_and(|layout| !matches!(layout, Layout::Plain(_)))
 }
 
 fn write(out: &Path, name: &str, text: &str) -> Result<()> {

@@ -17,11 +17,10 @@ use super::{
     estimates::Estimated,
     floors::{self, Floors},
     methods::Method,
-    side_by_side::guarded,
     store::{self, Found, MadeFrom, MethodResult},
     work::Context,
 };
-use crate::report;
+use crate::{report, side_by_side::guarded};
 
 /// A sequence's own report, below its folder.
 pub const REPORT: &str = "report/index.html";

@@ -17,6 +17,7 @@ pub mod objective;
 mod objective_config;
 pub mod observations;
 mod photometric;
+pub mod point_subset;
 mod progress;
 mod rows;
 mod shape_jacobian;

@@ -27,7 +27,7 @@ struct Block {
 }
 
 impl Trunk {
-    pub(super) fn new(config: &RegressorConfig, device: &Device) -> Self {
+    pub(crate) fn new(config: &RegressorConfig, device: &Device) -> Self {
         let mut blocks = Vec::new();
         let mut previous = 4;
         for (i, &channels) in config.channels.iter().enumerate() {

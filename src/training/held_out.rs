@@ -110,7 +110,11 @@ impl<'a> HeldOut<'a> {
     }
 }
 
-fn render(config: &TrainingConfig, shapes: &Shapes, models: &[usize]) -> Result<Vec<Crop>> {
+pub(super) fn render(
+    config: &TrainingConfig,
+    shapes: &Shapes,
+    models: &[usize],
+) -> Result<Vec<Crop>> {
     let views: Vec<_> = (0..config.data.views_per_validation).collect();
     let bar = ProgressBar::new(models.len() as u64).with_message("rendering");
     let render = |model_idx| {

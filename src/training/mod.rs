@@ -16,6 +16,9 @@ mod held_out;
 mod metrics;
 mod pose_errors;
 mod prior_report;
+mod psgn_config;
+mod psgn_report;
+mod psgn_stage;
 mod regressor_stage;
 mod resume;
 mod sampled_chamfer;
@@ -31,6 +34,9 @@ pub use data_config::DataConfig;
 pub use prior_report::{
     Reconstruction, ReconstructionErrors, ReportedShapes, TrainingShapes, report_prior,
 };
+pub use psgn_config::PsgnTrainingConfig;
+pub use psgn_report::{ComparedClouds, compare_clouds};
+pub use psgn_stage::train_psgn;
 pub use shards::write_shard;
 pub use stage::Measurements;
 

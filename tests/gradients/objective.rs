@@ -86,6 +86,8 @@ fn unknowns(style: &[f64], distance: f32, config: &ObjectiveConfig) -> Unknowns 
         unknowns.values[focal].fill(0.04);
     }
     unknowns.values.extend(style);
+    let likely = style.iter().map(|s| 0.7 * s).collect();
+    let unknowns = unknowns.expecting(likely);
     unknowns
 }
 

@@ -1,6 +1,9 @@
 //! Fig. 7: the shape prior against points that move on their own.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context, Result, bail};
 use burn::tensor::Device;
@@ -18,12 +21,10 @@ use object_pba::{
     reconstruction::{Scores, points, score, views},
 };
 
+use super::arm::freed;
 use crate::{Options, figures, input::Input, output, run::NO_REFERENCE_MASK};
 
-/// Step size or scale of a free point in world units, a tenth of the spacing of 6,144 points on a car.
-const POINT_RATE: f64 = 2e-3;
-
-pub fn ablate(sequences: &[std::path::PathBuf], out: &Path, options: &Options) -> Result<()> {
+pub fn compare_all(sequences: &[PathBuf], out: &Path, options: &Options) -> Result<()> {
     let mut config = options.bundle_adjustment()?;
     // Both arms share a solver, so it has to be one for any number of unknowns.
     if config.solver == Solver::Lm {
@@ -80,17 +81,7 @@ fn compare(
         bail!("{}: {NO_REFERENCE_MASK}", sequence.name);
     }
     let generator = &prior.shape.generator;
-    let cloud = points(generator, &with_prior[0].unknowns, device);
-    let free = |start: &Hypothesis| Hypothesis {
-        unknowns: start.unknowns.with_style(host_points(&cloud).as_flattened()),
-        confidence: start.confidence,
-    };
-    let free: Vec<Hypothesis> = with_prior.iter().map(free).collect();
-
-    let mut free_config = config.clone();
-    free_config.objective.style_weight = 0.0;
-    free_config.adam.style_rate = POINT_RATE;
-    free_config.lbfgs.style_scale = POINT_RATE;
+    let (free, free_config) = freed(generator, &with_prior, config, device);
     let arm = |shape: &dyn ShapeModel, unknowns: &Unknowns| Arm {
         scores: score(sequence, shape, unknowns, device),
         picture: picture(sequence, shape, unknowns, config, device),
