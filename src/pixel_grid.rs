@@ -6,7 +6,10 @@
 
 use std::cell::OnceCell;
 
-use crate::{nearest_neighbours::NearestNeighbours, silhouette::Segment};
+use crate::{
+    nearest_neighbours::NearestNeighbours,
+    silhouette::{Segment, Target},
+};
 
 /// Rings around a query that are searched before the tree is asked.
 const MAX_RINGS: i32 = 12;
@@ -23,6 +26,10 @@ pub struct PixelGrid {
     locations: Vec<([f32; 2], u32)>,
     tree: OnceCell<NearestNeighbours>,
 }
+
+/// Share of the squared distance from a segment's middle that counts: as much as rounding does, so that the
+/// order of locations is nothing that is seen.
+const TIE_BREAK: f32 = 1e-6;
 
 /// The nearest so far, and its squared distance.
 type Best = (f32, u32);
@@ -70,10 +77,13 @@ impl PixelGrid {
             .unwrap_or_else(|| self.locations[self.tree().nearest_pixel(query) as usize].1)
     }
 
-    /// The index of the location nearest to a segment whose middle lies in the image; where there are no
-    /// locations, it is just zero.
+    /// The index of the location nearest to a segment whose middle lies in the image, and of those that are
+    /// equally near the one nearest to that; where there are no locations, it is just zero.
     pub fn nearest_to(&self, segment: &Segment) -> u32 {
-        let squared = |location| segment.nearest(location).squared(location);
+        let squared = |location| {
+            let from_middle = Target::from(segment.middle).squared(location);
+            segment.nearest(location).squared(location) + TIE_BREAK * from_middle
+        };
         let all_rings = self.columns.max(self.rows);
         self.search(segment.middle, segment.reach, all_rings, squared).unwrap_or(0)
     }
