@@ -36,7 +36,7 @@ use object_pba::{
     },
     device::Backend,
     host::{host_pixels, index_tensor},
-    loss::{SilhouetteMatching, silhouette_pairs},
+    loss::{SilhouetteMatching, SilhouetteTolerances, silhouette_pairs},
     pseudo_render::{PseudoRenderConfig, visible_points},
     sampling::ImageTable,
     shape_prior::{Generator, ShapePriorConfig},
@@ -236,8 +236,7 @@ mod parts {
         let matching = SilhouetteMatching {
             to_outline: true,
             weights: [1.0; 2],
-            tolerances: [0.25, 0.0],
-            hole_tolerance: 1.0,
+            tolerances: SilhouetteTolerances { coverage: 0.0, hole: 1.0, containment: 0.0 },
             trim: 0.0,
         };
         bencher.bench(|| {

@@ -47,9 +47,11 @@ pub fn hypotheses(
         Start::Truth => {
             let unknowns = true_unknowns(prior, sequence, config.objective.parameterisation);
             let regressed = InitialGuess::hypotheses(prior, sequence, config);
-            let likely = regressed.first().map(|guess| guess.unknowns.likely_style().to_vec());
-            let start = unknowns.zip(likely).map(|(truth, likely)| truth.expecting(likely));
-            start.map(Hypothesis::from).into_iter().collect()
+            let expecting = |truth: Unknowns| match regressed.first() {
+                Some(guess) => truth.expecting(guess.unknowns.likely_style().to_vec()),
+                None => truth,
+            };
+            unknowns.map(expecting).map(Hypothesis::from).into_iter().collect()
         }
     }
 }

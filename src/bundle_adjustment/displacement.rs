@@ -1,7 +1,7 @@
 //! Beyond the prior's manifold: X = G(s) + Σ c_j φ_j, small and smooth displacements of what is seen.
 //!
 //! What the prior cannot represent, poses make up for. So once the style has converged, points may move
-//! along the surface's normal, by a [smooth field](super::smooth_field) whose modes φ_j are as likely at
+//! along the surface's normal, by a smooth field whose modes φ_j are as likely at
 //! unit c_j as the whitened style's directions are: one weight holds both.
 
 use std::ops::Range;

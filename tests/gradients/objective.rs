@@ -90,8 +90,7 @@ fn unknowns(style: &[f64], distance: f32, config: &ObjectiveConfig) -> Unknowns 
     }
     unknowns.values.extend(style);
     let likely = style.iter().map(|s| 0.7 * s).collect();
-    let unknowns = unknowns.expecting(likely);
-    unknowns
+    unknowns.expecting(likely)
 }
 
 fn evaluate(shape: &dyn ShapeModel, unknowns: &Unknowns, config: &ObjectiveConfig) -> Evaluation {
