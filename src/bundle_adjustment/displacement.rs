@@ -68,6 +68,12 @@ impl Displacement {
         self.modes.dims()[0]
     }
 
+    /// The objective of the longer vector: the style's weight is of a mean, and each direction keeps its own.
+    pub(super) fn objective(&self, config: &ObjectiveConfig) -> ObjectiveConfig {
+        let longer = (self.n_style + self.n_modes()) as f32 / self.n_style.max(1) as f32;
+        ObjectiveConfig { style_weight: longer * config.style_weight, ..config.clone() }
+    }
+
     /// Leading entries of the vector that are solved for.
     pub(super) fn n_solved(&self) -> usize {
         self.n_leading + self.n_modes()
@@ -140,10 +146,7 @@ pub(super) fn leave_manifold(
     let (leading, others) = unknowns.likely_style().split_at(moved.n_leading);
     let likely = [leading, &vec![0.0; moved.n_modes()], others].concat();
     *unknowns = unknowns.with_style(&vector).expecting(likely);
-    // The weight is of a mean: that of each direction stays.
-    let longer = vector.len() as f32 / style.len().max(1) as f32;
-    let style_weight = longer * objective.config.style_weight;
-    let config = ObjectiveConfig { style_weight, ..objective.config.clone() };
+    let config = moved.objective(objective.config);
     let shape = Displaced { prior: objective.shape, displacement: Some(&moved) };
     let objective = Objective {
         shape: &shape,

@@ -233,7 +233,13 @@ pub fn bundle_adjust(
         displacement = Some(moved);
     }
     let shape = Displaced { prior: shape, displacement: displacement.as_ref() };
-    let objective = Objective { shape: &shape, device: device.clone(), ..objective };
+    let longer = displacement.as_ref().map(|moved| moved.objective(&config.objective));
+    let objective = Objective {
+        shape: &shape,
+        config: longer.as_ref().unwrap_or(&config.objective),
+        device: device.clone(),
+        ..objective
+    };
     let certain = || {
         let n_directions =
             displacement.as_ref().map_or(config.lm.n_directions, Displacement::n_solved);
