@@ -153,14 +153,10 @@ pub fn freed(
     (starts.iter().map(free).collect(), config)
 }
 
-fn first_frames(mut sequence: Sequence, n_frames: Option<usize>) -> Result<Sequence> {
+fn first_frames(sequence: Sequence, n_frames: Option<usize>) -> Result<Sequence> {
     let n = n_frames.unwrap_or(sequence.frames.len());
     if n > sequence.frames.len() {
         bail!("it has {} frames only", sequence.frames.len());
     }
-    sequence.frames.truncate(n);
-    if let Some(truth) = &mut sequence.truth {
-        truth.camera_from_world.truncate(n);
-    }
-    Ok(sequence)
+    Ok(sequence.first_frames(n))
 }

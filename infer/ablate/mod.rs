@@ -26,6 +26,7 @@ use object_pba::{
     device::Backend,
 };
 
+pub use self::arm::freed;
 use self::{arm::Reconstructor, results::Results, store::Store, studies::Study};
 use crate::{
     Options,

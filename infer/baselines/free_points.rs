@@ -7,14 +7,11 @@ use object_pba::{
         shape_model::{FreePoints, ShapeModel},
     },
     data::sequence::Sequence,
-    host::host_points,
-    reconstruction::points,
 };
 
-/// Step size of a free point in world units, a tenth of the spacing of 6,144 points on a car.
-const POINT_RATE: f64 = 2e-3;
+use crate::ablate::freed;
 
-/// Poses and points from where the prior's cloud starts, under the objective of `config`, by Adam: it
+/// Poses and points from where the prior's clouds start, under the objective of `config`, by Adam: it
 /// is the joint solver that suits so many unknowns. Panics without a hypothesis.
 pub fn free_points(
     sequence: &Sequence,
@@ -23,15 +20,7 @@ pub fn free_points(
     config: &BundleAdjustmentConfig,
     device: &Device,
 ) -> Outcome {
-    let cloud = host_points(&points(shape, &hypotheses[0].unknowns, device));
-    let free = |start: &Hypothesis| Hypothesis {
-        unknowns: start.unknowns.with_style(cloud.as_flattened()),
-        confidence: start.confidence,
-    };
-    let hypotheses: Vec<Hypothesis> = hypotheses.iter().map(free).collect();
-    let mut config = config.clone();
+    let (hypotheses, mut config) = freed(shape, hypotheses, config, device);
     config.solver = Solver::Adam;
-    config.objective.style_weight = 0.0;
-    config.adam.style_rate = POINT_RATE;
     bundle_adjust(sequence, &FreePoints, &hypotheses, &config, device, &mut |_, _| {})
 }

@@ -77,11 +77,7 @@ impl Context {
 
     /// The chosen solver on the first `n_views` frames; of one, the paper takes the initialisation.
     pub fn first_views(&self, n_views: usize, sequence: &Sequence) -> Result<Applied> {
-        let mut sequence = sequence.clone();
-        sequence.frames.truncate(n_views);
-        if let Some(truth) = &mut sequence.truth {
-            truth.camera_from_world.truncate(n_views);
-        }
+        let sequence = sequence.clone().first_frames(n_views);
         if n_views > 1 {
             return self.adjusted(&sequence, &self.config);
         }

@@ -46,7 +46,7 @@ impl ShapeModel for PointSubset<'_> {
 }
 
 /// The first point, then time and again the one that is farthest from all before it; in ascending order.
-fn farthest_points(points: &[[f32; 3]], n: usize) -> Vec<i64> {
+pub(super) fn farthest_points(points: &[[f32; 3]], n: usize) -> Vec<i64> {
     let squared = |a: [f32; 3], b: [f32; 3]| -> f32 { (0..3).map(|i| (a[i] - b[i]).powi(2)).sum() };
     // To the nearest of those chosen, which themselves are out of the running.
     let mut distances = vec![f32::INFINITY; points.len()];

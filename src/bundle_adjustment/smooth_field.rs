@@ -8,6 +8,7 @@
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 use rayon::prelude::*;
 
+use super::point_subset::farthest_points;
 use crate::pseudo_render::surface::Surface;
 
 /// Points that stand for all.
@@ -92,21 +93,11 @@ impl SmoothField {
         f64::from(self.deviation * self.deviation * a.normal.dot(&b.normal) * (-squared).exp())
     }
 
-    /// Points that lie far from each other: each next one is the farthest from those before.
+    /// Points among those seen that lie far from each other.
     fn nodes(&self) -> Vec<usize> {
-        let mut chosen = Vec::new();
-        let mut distances = vec![f32::INFINITY; self.seen.len()];
-        while chosen.len() < N_NODES.min(self.seen.len()) {
-            let farthest =
-                (0..distances.len()).max_by(|&a, &b| distances[a].total_cmp(&distances[b]));
-            let next = self.seen[farthest.expect("some are seen")];
-            chosen.push(next);
-            for (distance, &i) in distances.iter_mut().zip(&self.seen) {
-                let offset = self.points[i].at - self.points[next].at;
-                *distance = distance.min(offset.norm_squared());
-            }
-        }
-        chosen
+        let seen: Vec<[f32; 3]> = self.seen.iter().map(|&i| self.points[i].at.into()).collect();
+        let chosen = farthest_points(&seen, N_NODES.min(seen.len()));
+        chosen.into_iter().map(|i| self.seen[i as usize]).collect()
     }
 
     /// Combinations of components, a column each, whose movements of what is seen add up to no rigid one.

@@ -96,6 +96,15 @@ impl Default for SequenceOptions {
 }
 
 impl Sequence {
+    /// The first `n_frames` alone, or all where there are fewer.
+    pub fn first_frames(mut self, n_frames: usize) -> Self {
+        self.frames.truncate(n_frames);
+        if let Some(truth) = &mut self.truth {
+            truth.camera_from_world.truncate(n_frames);
+        }
+        self
+    }
+
     /// The same pictures, of which another is the reference frame: it comes first, the others keep their
     /// order. Panics if there is no such frame.
     pub fn with_reference(mut self, frame: usize) -> Self {
